@@ -5,8 +5,6 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from pathlib import Path
 
-import numpy as np
-
 from bench.problems import Array, Case
 
 
@@ -21,8 +19,6 @@ class Contender(ABC):
         """Build the tasks and limits; the state is that of :meth:`reset`."""
         self.case = case
         self.problem = case.problem
-        #: Durations of what was done once [s], by name
-        self.facts: dict[str, float] = {}
 
     @abstractmethod
     def reset(self) -> None:
@@ -56,24 +52,3 @@ class Contender(ABC):
         self.aim(tick)
         self.call()
         self.settle()
-
-
-def exact_solution(hessian: Array, linear: Array, rows: Array, upper: Array) -> Array:
-    """Minimise 1/2 x'Hx + g'x subject to rows x <= upper by quadprog, then solve its active set once more.
-
-    The second solve is the KKT system of the rows that quadprog found active, refined once, so that the
-    reference is not limited by quadprog's own rounding.
-    """
-    import quadprog
-
-    finite = np.isfinite(upper)
-    rows, upper = rows[finite], upper[finite]
-    out = quadprog.solve_qp(hessian, -linear, -rows.T.copy(), -upper)
-    active = np.sort(out[5][out[5] > 0]) - 1
-    active = active[out[4][active] > 0]
-    n, m = len(linear), len(active)
-    kkt = np.block([[hessian, rows[active].T], [rows[active], np.zeros((m, m))]])
-    right = np.concatenate([-linear, upper[active]])
-    solution = np.linalg.lstsq(kkt, right, rcond=None)[0]
-    solution += np.linalg.lstsq(kkt, right - kkt @ solution, rcond=None)[0]
-    return np.asarray(solution[:n])

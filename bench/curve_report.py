@@ -16,14 +16,9 @@ TITLES = {
     "sensed": "Tick against measured pairs: 5 boxes on a Panda's links against boxes; medians [us]",
     "g1": "Self-collision: Unitree G1, 4 poses, centre of mass, posture, limits, 20 pairs of capsules; medians [us]",
 }
+#: What grows; panels of the picture are those where it says so
 AXES = {
     "joints": "degrees of freedom", "tasks": "pose tasks", "spheres": "spheres", "sensed": "pairs", "g1": "",
-}  # fmt: skip
-
-#: Panels of the picture, and colours of its lines
-PANELS = {
-    "joints": "degrees of freedom", "tasks": "pose tasks (Talos)", "spheres": "spheres against a Panda",
-    "sensed": "measured pairs of boxes",
 }  # fmt: skip
 COLOURS = {"wbc": "#0b6e4f", "pink + daqp": "#c2185b", "mink + daqp": "#1565c0", "placo": "#ef6c00"}
 
@@ -49,6 +44,10 @@ default of 1 cm, which lets joints close in faster than the rate of the others. 
 MuJoCo, with these capsules as its geoms."""
 
 
+#: What is said of a path
+KEYS = ("position", "clearance")
+
+
 def curve_sheets(curves: Sequence[dict[str, Any]]) -> list[Sheet]:
     """Tables of all curves."""
     out = []
@@ -64,8 +63,10 @@ def medians(title: str, curve: str, found: Sequence[dict[str, Any]]) -> Sheet:
     names = list(found[0]["contenders"])
     rows = []
     for point in found:
-        own = point["contenders"][OURS]["median"]
-        cells = [_ratio(point["contenders"][name]["median"], own, name) for name in names]
+        spent = [point["contenders"][name]["median"] for name in names]
+        cells = (
+            us(x) if name == OURS else f"{us(x)} ({x / spent[0]:.1f}x)" for name, x in zip(names, spent, strict=True)
+        )
         rows.append((point["label"], *cells))
     return Sheet(title, (AXES[curve], *names), rows)
 
@@ -73,15 +74,13 @@ def medians(title: str, curve: str, found: Sequence[dict[str, Any]]) -> Sheet:
 def same_job(curve: str, found: Sequence[dict[str, Any]]) -> Sheet:
     """End errors [mm] and least clearances [mm] of all."""
     names = list(found[0]["contenders"])
+    clear = any(one["clearance"] is not None for point in found for one in point["contenders"].values())
+    keys, what = (KEYS, "End error / least clearance [mm]") if clear else (KEYS[:1], "End error [mm]")
     rows = []
     for point in found:
-        cells = []
-        for name in names:
-            one = point["contenders"][name]
-            parts = ["-" if one[key] is None else f"{one[key] * 1e3:.2f}" for key in ("position", "clearance")]
-            cells.append(" / ".join(parts if curve in ("spheres", "sensed", "g1") else parts[:1]))
+        some = [[point["contenders"][name][key] for key in keys] for name in names]
+        cells = (" / ".join("-" if x is None else f"{x * 1e3:.2f}" for x in numbers) for numbers in some)
         rows.append((point["label"], *cells))
-    what = "End error / least clearance [mm]" if curve in ("spheres", "sensed", "g1") else "End error [mm]"
     return Sheet(what, (AXES[curve], *names), rows)
 
 
@@ -103,10 +102,6 @@ def curve_readme(curves: Sequence[dict[str, Any]]) -> list[str]:
     return lines
 
 
-def _ratio(value: float, own: float, name: str) -> str:
-    return us(value) if name == OURS else f"{us(value)} ({value / own:.1f}x)"
-
-
 def draw(curves: Sequence[dict[str, Any]], path: Path) -> None:
     """One panel a curve, medians of the tick over what grows, written as PNG."""
     import matplotlib
@@ -114,14 +109,15 @@ def draw(curves: Sequence[dict[str, Any]], path: Path) -> None:
     matplotlib.use("Agg")
     from matplotlib import pyplot as plt
 
-    figure, axes = plt.subplots(1, len(PANELS), figsize=(13.0, 3.4), sharey=True, layout="constrained")
-    for axis, (curve, label) in zip(axes, PANELS.items(), strict=True):
+    panels = [curve for curve in AXES if AXES[curve]]
+    figure, axes = plt.subplots(1, len(panels), figsize=(13.0, 3.4), sharey=True, layout="constrained")
+    for axis, curve in zip(axes, panels, strict=True):
         found = [point for point in curves if point["curve"] == curve]
         for name, colour in COLOURS.items():
             places = [(p["x"], p["contenders"][name]["median"]) for p in found if name in p["contenders"]]
             axis.plot(*zip(*places, strict=True), "o-", color=colour, label=name, markersize=4) if places else None
         axis.set_yscale("log")
-        axis.set_xlabel(label)
+        axis.set_xlabel(AXES[curve])
         axis.set_xlim(left=0.0)
         axis.grid(alpha=0.3, which="major")
     axes[0].set_ylabel("median of one tick [us]")

@@ -5,16 +5,16 @@ Targets are those of a path of the joints, so that all can be reached at once.
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from bench.descriptions import write_urdf
-from bench.problems import Array, Problem, Solid, save
+from bench.prepare import against_fixed, phases, write
+from bench.problems import Array, Solid
 from bench.scenery import G1_PAIRS, boxes_around, capsules, clearances, link_boxes, spheres_around
 from wbc.robot import Robot
 from wbc.robots import fit_shapes, load
@@ -86,24 +86,21 @@ def prepare_curves(folder: Path) -> None:
     for name, frames in JOINTS.items():
         robot = by_name(name)
         assert robot.nv == NV[name], (name, robot.nv)
-        write(folder / f"joints_{name}", f"{name}: two poses, posture, limits", robot, frames)
+        along(folder / f"joints_{name}", f"{name}: two poses, posture, limits", robot, frames)
     talos = by_name("talos")
     for n in TASKS:
-        write(folder / f"tasks_{n}", f"Talos: {n} poses, posture, limits", talos, TALOS_FRAMES[:n])
+        along(folder / f"tasks_{n}", f"Talos: {n} poses, posture, limits", talos, TALOS_FRAMES[:n])
     panda = by_name("panda")
     arm = capsules(panda)
     balls = spheres_around(panda, arm, joint_path(panda), max(SPHERES))
     for n in SPHERES:
         title = f"Panda: pose, posture, limits, {len(arm)} capsules against {n} spheres"
-        write(folder / f"spheres_{n}", title, panda, ["panda_hand"], solids=arm + balls[:n], against_fixed=True)
+        among(folder / f"spheres_{n}", title, panda, arm + balls[:n])
     blocks = link_boxes(panda)
     crates = boxes_around(panda, blocks, joint_path(panda), max(BOXES))
     for n in BOXES:
         title = f"Panda: pose, posture, limits, {len(blocks)} boxes against {n} boxes"
-        write(
-            folder / f"sensed_{5 * n}", title, panda, ["panda_hand"], solids=blocks + crates[:n], against_fixed=True,
-            sensed=CLOSEST,
-        )  # fmt: skip
+        among(folder / f"sensed_{5 * n}", title, panda, blocks + crates[:n], CLOSEST)
     write_g1(folder / "g1_self")
 
 
@@ -119,7 +116,7 @@ def write_g1(folder: Path) -> None:
     assert least > 0.01, least
     frames = ["left_ankle_roll_link", "right_ankle_roll_link", "left_rubber_hand", "right_rubber_hand"]
     title = "Unitree G1: 4 poses, centre of mass, posture, limits, floating base, self-collision of 20 pairs"
-    write(folder, title, g1, frames, solids=solids, pairs=pairs, com=True)
+    along(folder, title, g1, frames, solids=solids, pairs=pairs, com=True)
 
 
 def by_name(name: str) -> Robot:
@@ -142,48 +139,26 @@ def start(robot: Robot) -> Array:
 def joint_path(robot: Robot) -> list[Array]:
     """Configurations along a closed path that starts off its first one and rests at its end."""
     q0, nv, base = start(robot), robot.nv, robot.base_nv
-    s = np.concatenate([np.sin(0.5 * np.pi * np.linspace(0.0, 1.0, TICKS - REST)), np.ones(REST)])
     lower, upper = robot.limits.position_lower[base:], robot.limits.position_upper[base:]
     reach = np.clip(0.5 * np.minimum(upper - q0[-(nv - base) :], q0[-(nv - base) :] - lower), 0.0, AMPLITUDE)
     size = np.concatenate([np.full(base, 0.02), reach])
     shift = np.arange(nv) * 2.4
-    return [np.array(pin.integrate(robot.model, q0, size * np.sin(2 * np.pi * t + shift))) for t in s]
+    return [np.array(pin.integrate(robot.model, q0, size * np.sin(2 * np.pi * t + shift))) for t in phases(TICKS, REST)]
 
 
-def write(
-    folder: Path,
-    title: str,
-    robot: Robot,
-    frames: Sequence[str],
-    *,
-    solids: Sequence[Solid] = (),
-    against_fixed: bool = False,
-    pairs: Sequence[tuple[int, int]] = (),
-    sensed: int = 0,
-    com: bool = False,
-) -> None:
-    """Write one problem; ``against_fixed``: all solids on links keep clear of all in the world."""
-    if against_fixed:
-        numbers = range(len(solids))
-        pairs = [(a, b) for b in numbers for a in numbers if solids[a].link and not solids[b].link]
-    used = solids if pairs else ()
-    urdf = Path(robot.source)
-    locked = sorted(movable(urdf) - set(robot.joint_names))
-    write_urdf(urdf, folder / "robot.urdf", locked=locked, solids=used)
+def among(folder: Path, title: str, robot: Robot, solids: Sequence[Solid], sensed: int = 0) -> None:
+    """Write a problem of a hand whose solids on links keep clear of all in the world."""
+    if pairs := against_fixed(solids):
+        along(folder, title, robot, ["panda_hand"], solids=list(solids), pairs=pairs, sensed=sensed)
+    else:
+        along(folder, title, robot, ["panda_hand"])
+
+
+def along(folder: Path, title: str, robot: Robot, frames: Sequence[str], **more: Any) -> None:
+    """Write one problem on the path of the joints; ``more`` as for :func:`~bench.prepare.write`."""
     data, poses, centres = robot.model.createData(), [], []
     for q in joint_path(robot):
         pin.framesForwardKinematics(robot.model, data, q)
         poses.append([data.oMf[robot.model.getFrameId(f)].homogeneous for f in frames])
         centres.append(np.array(pin.centerOfMass(robot.model, data, q)))
-    joints = [str(name) for name in robot.joint_names if name != "root_joint"]
-    problem = Problem(
-        folder.name, title, robot="", joints=joints, frames=list(frames), q0=start(robot).tolist(),
-        length=robot.characteristic_length, floating=robot.base == "floating", com=com, solids=list(used),
-        pairs=list(pairs), sensed=sensed if pairs else 0,
-    )  # fmt: skip
-    save(folder, problem, np.array(poses), np.array(centres))
-
-
-def movable(urdf: Path) -> set[str]:
-    """Joints of a URDF that are not fixed."""
-    return {str(j.get("name")) for j in ET.parse(urdf).getroot().iter("joint") if j.get("type") not in (None, "fixed")}
+    write(folder, title, robot, start(robot), frames, poses, centres, **more)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import contextlib
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from bench.harness import OURS, PEERS, statistics
-from bench.pool import Worker, cores, turns
+from bench.harness import OURS, pythons, statistics
+from bench.pool import contest, turns
 from bench.problems import load
 from bench.sheet import Sheet, us
 
@@ -24,18 +22,15 @@ TAILS = ("median", "p99", "p99.9", "max")
 
 def measure(problem: Path, peers_python: str | None, rounds: int | None, say: Callable[[str], None]) -> dict[str, Any]:
     """Durations [us] of all contenders on the problem in a folder, in alternating rounds."""
-    case, (core, _) = load(problem), cores()
-    pythons = {OURS: sys.executable} | ({} if peers_python is None else dict.fromkeys(PEERS, peers_python))
-    rounds = rounds or ROUNDS[problem.name]
-    spent: dict[str, dict[str, list[float]]] = {name: {} for name in pythons}
-    with contextlib.ExitStack() as stack:
-        workers = {n: stack.enter_context(Worker(python, n, problem, core)) for n, python in pythons.items()}
+    case, rounds = load(problem), rounds or ROUNDS[problem.name]
+    spent: dict[str, dict[str, list[float]]] = {}
+    with contest(pythons(peers_python), problem) as workers:
         for worker in workers.values():
             worker.ask("time", ticks=case.ticks)
         for turn, name in turns(list(workers), rounds):
             say(f"{problem.name}: round {turn + 1} of {rounds}, {name}")
             for part, values in workers[name].ask("time", ticks=case.ticks).items():
-                spent[name].setdefault(part, []).extend(values)
+                spent.setdefault(name, {}).setdefault(part, []).extend(values)
     durations = {name: {part: statistics(values) for part, values in own.items()} for name, own in spent.items()}
     return {"title": case.problem.title, "ticks": case.ticks * rounds, "durations": durations}
 

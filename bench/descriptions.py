@@ -6,10 +6,13 @@ formats; spheres on links and obstacles are written as collision geometry, which
 
 from __future__ import annotations
 
-import math
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
 
 from bench.problems import Solid
 
@@ -17,13 +20,14 @@ from bench.problems import Solid
 FIXED = "fixed"
 
 
-def write_urdf(
-    source: Path,
-    target: Path,
-    *,
-    locked: Iterable[str] = (),
-    solids: Sequence[Solid] = (),
-) -> None:
+def write_robot(robot: Any, target: Path, solids: Sequence[Solid] = ()) -> None:
+    """As :func:`write_urdf`, of a robot of the table: what is no joint of it is fixed."""
+    joints = ET.parse(robot.source).getroot().iter("joint")
+    movable = {str(joint.get("name")) for joint in joints if joint.get("type") not in (None, "fixed")}
+    write_urdf(Path(robot.source), target, locked=movable - set(robot.joint_names), solids=solids)
+
+
+def write_urdf(source: Path, target: Path, *, locked: Iterable[str] = (), solids: Sequence[Solid] = ()) -> None:
     """Write a copy of a URDF without meshes.
 
     Args:
@@ -59,16 +63,8 @@ def mujoco_urdf(text: str) -> str:
     """The same URDF with MuJoCo's extension element: keep fixed links as bodies, accept any inertia."""
     root = ET.fromstring(text)
     extension = ET.SubElement(root, "mujoco")
-    ET.SubElement(
-        extension,
-        "compiler",
-        fusestatic="false",
-        discardvisual="false",
-        balanceinertia="true",
-        boundmass="1e-9",
-        boundinertia="1e-12",
-        strippath="false",
-    )
+    kept = dict.fromkeys(("fusestatic", "discardvisual", "strippath"), "false")
+    ET.SubElement(extension, "compiler", kept, balanceinertia="true", boundmass="1e-9", boundinertia="1e-12")
     return ET.tostring(root, encoding="unicode")
 
 
@@ -96,7 +92,12 @@ def _add_solid(root: ET.Element, links: Mapping[str | None, ET.Element], base: s
         ET.SubElement(joint, "parent", link=base)
         ET.SubElement(joint, "child", link=f"{FIXED}{k}")
     collision = ET.SubElement(link, "collision", name=solid_name(k))
-    ET.SubElement(collision, "origin", xyz=_numbers(solid.place), rpy=_numbers(roll_pitch_yaw(solid.turn)))
+    ET.SubElement(
+        collision,
+        "origin",
+        xyz=_numbers(solid.place),
+        rpy=_numbers(pin.rpy.matrixToRpy(pin.Quaternion(np.array(solid.turn)).matrix())),
+    )
     geometry = ET.SubElement(collision, "geometry")
     if solid.kind == "sphere":
         ET.SubElement(geometry, "sphere", radius=repr(solid.size[0]))
@@ -106,16 +107,6 @@ def _add_solid(root: ET.Element, links: Mapping[str | None, ET.Element], base: s
         # Pinocchio takes a cylinder for a capsule where this element names it; in MuJoCo the contender does so
         ET.SubElement(geometry, "cylinder", radius=repr(solid.size[0]), length=repr(solid.size[1]))
         ET.SubElement(ET.SubElement(link, "collision_checking"), "capsule", name=solid_name(k))
-
-
-def roll_pitch_yaw(turn: Sequence[float]) -> tuple[float, float, float]:
-    """Fixed-axis angles [rad] of a unit quaternion (x, y, z, w)."""
-    x, y, z, w = turn
-    return (
-        math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
-        math.asin(max(-1.0, min(1.0, 2 * (w * y - z * x)))),
-        math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
-    )
 
 
 def _numbers(values: Sequence[float]) -> str:

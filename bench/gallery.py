@@ -13,6 +13,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -54,8 +55,7 @@ def film(browser: Chromium, name: str) -> Path:
             for _ in range(round(SECONDS / FRAMES / dt)):
                 turn = 2 * math.pi * number * dt / SECONDS
                 off = radius * np.array([0.0, math.sin(turn), 1.0 - math.cos(turn)])
-                pose = isinstance(home, pin.SE3)
-                controller[task].target = pin.SE3(home.rotation, home.translation + off) if pose else home + off
+                controller[task].target = beside(home, off)
                 step = controller.step(q)
                 q = chosen.stack.robot.integrate(q, step.v, dt)
                 number += 1
@@ -65,7 +65,7 @@ def film(browser: Chromium, name: str) -> Path:
                 undisturbed(page)
             page.wait(f"wbc.state.number >= {frame + 1}", 60.0)
             time.sleep(0.6)
-            pictures.append(Image.open(io.BytesIO(page.picture())).convert("RGB"))
+            pictures.append(shot(page))
     file = FOLDER / f"play_{name.replace('-', '_')}.gif"
     return save([picture.crop(CUT).resize(SIZE) for picture in pictures[1:]], file)
 
@@ -93,7 +93,7 @@ def held_back(browser: Chromium) -> Path:
         try:
             page.wait(EXPLAINED, 60.0)
             undisturbed(page)
-            shown = Image.open(io.BytesIO(page.picture())).convert("RGB")
+            shown = shot(page)
         finally:
             over.set()
             running.join()
@@ -110,8 +110,7 @@ def strip() -> Path:
         controller.reset(q)
         moved, off = led(chosen), 0.8 * RADII.get(name, 0.12) * np.array([0.5, 1.0, 0.3])
         home = controller[moved].target
-        pose = isinstance(home, pin.SE3)
-        controller[moved].target = pin.SE3(home.rotation, home.translation + off) if pose else home + off
+        controller[moved].target = beside(home, off)
         for _ in range(round(1.0 / chosen.stack.dt)):
             step = controller.step(q)
             q = chosen.stack.robot.integrate(q, step.v, chosen.stack.dt)
@@ -120,9 +119,7 @@ def strip() -> Path:
             page = browser.open(f"{viewer.url}?bare&watch")
             page.wait("wbc.state", 60.0)
             undisturbed(page)
-            shown = (
-                Image.open(io.BytesIO(page.picture())).convert("RGB").crop(CUT).resize(CELL, Image.Resampling.LANCZOS)
-            )
+            shown = shot(page).crop(CUT).resize(CELL, Image.Resampling.LANCZOS)
         ImageDraw.Draw(shown).text((10, 8), f"wbc view play {name}", fill=(29, 39, 51), font=ImageFont.load_default(15))
         pictures.append(shown)
     sheet = Image.new("RGB", (3 * CELL[0], 2 * CELL[1]))
@@ -137,6 +134,16 @@ def led(chosen: Playground) -> str:
     return next(e.name for e in chosen.stack.tasks if type(e.item).__name__ == "EndEffector")
 
 
+def beside(home: Any, off: np.ndarray) -> Any:
+    """A target, a pose or a place, that is shifted [m]."""
+    return pin.SE3(home.rotation, home.translation + off) if isinstance(home, pin.SE3) else home + off
+
+
+def shot(page: Page) -> Image.Image:
+    """What the page shows."""
+    return Image.open(io.BytesIO(page.picture())).convert("RGB")
+
+
 def undisturbed(page: Page) -> None:
     """The scene is drawn, and viser has said what it says of software that draws."""
     scene = "document.getElementById('scene').contentDocument"
@@ -145,7 +152,7 @@ def undisturbed(page: Page) -> None:
     while drawn < BUSY and time.monotonic() < until:
         time.sleep(3.0)
         page.evaluate(f"{scene}.querySelectorAll('.mantine-Notification-closeButton').forEach((b) => b.click())")
-        shown = np.asarray(Image.open(io.BytesIO(page.picture())).convert("L"), dtype=float)
+        shown = np.asarray(shot(page).convert("L"), dtype=float)
         drawn = float(shown[: int(0.8 * shown.shape[0]), : int(0.6 * shown.shape[1])].std())
     # Meshes come after the floor, and what viser says goes slowly
     time.sleep(4.0)

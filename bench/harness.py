@@ -1,22 +1,34 @@
-"""What every run says about itself, and how samples are summed up."""
+"""What every run says about itself, who takes part, and how samples are summed up."""
 
 from __future__ import annotations
 
-import os
+import json
 import platform
+import subprocess
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from bench.pool import cores
+from bench.pool import ROOT, cores
 
 #: Contender that ratios are taken to
 OURS = "wbc"
 #: What stands beside it
 PEERS = ("pink + daqp", "mink + daqp", "placo")
-#: Environment variables that change how fast numeric code runs
-SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "PYTHONOPTIMIZE", "PYTHONMALLOC")
+#: Where `make bench` installs the peers
+PEERS_PYTHON = ROOT / ".venv-peers" / "bin" / "python"
+
+
+def interpreter(path: str) -> str:
+    """An option that names one, from every folder. Not resolved: a virtual environment's interpreter is a link."""
+    return str(Path(path).absolute())
+
+
+def pythons(peers_python: str | None, peers: Sequence[str] = PEERS) -> dict[str, str]:
+    """Contender -> interpreter; without that of the peers they are left out."""
+    return {OURS: sys.executable} | dict.fromkeys(peers if peers_python else (), str(peers_python))
 
 
 def statistics(nanoseconds: Sequence[float]) -> dict[str, float]:
@@ -40,6 +52,12 @@ def machine() -> dict[str, str]:
         "python": platform.python_version(),
         "cores": cores()[1],
         "load": f"{load_average} (1 minute average before the run)",
-        "garbage collector": "on, as Python starts it",
-        "threads": ", ".join(f"{name} {os.environ.get(name, 'not set')}" for name in SETTINGS),
     }
+
+
+def versions(python: str, names: Sequence[str]) -> dict[str, str]:
+    """Package -> version in the environment of an interpreter."""
+    code = "import importlib.metadata as m, json, sys; print(json.dumps({n: m.version(n) for n in sys.argv[1:]}))"
+    done = subprocess.run([python, "-c", code, *names], capture_output=True, text=True, check=True, cwd=ROOT.anchor)
+    found: dict[str, str] = json.loads(done.stdout)
+    return found

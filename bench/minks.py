@@ -53,7 +53,6 @@ class Mink(Contender):
         ]
         if problem.pairs:
             self.limits.append(self._collisions())
-            self.facts["pairs"] = float(self.limits[-1].max_num_contacts)
         self.reset()
 
     def _collisions(self) -> mink.CollisionAvoidanceLimit:

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from time import perf_counter, perf_counter_ns
+from time import perf_counter_ns
 from typing import Any
 
 import numpy as np
 
 import wbc
-from bench.contender import Contender, exact_solution
+from bench.contender import Contender
 from bench.problems import Array, Case
-from bench.reference import Referee
 from bench.solids import keep_clear, link_shapes
 from wbc.controller import core_of
 from wbc.tick.native import NativeTick
@@ -39,9 +38,7 @@ class Ours(Contender):
         for name, constraint in clear.items():
             stack.add(constraint, name=name)
         self.tasks = [e.name for e in stack.tasks]
-        start = perf_counter()
         self.controller = stack.compile(wait=True)
-        self.facts["compile"] = perf_counter() - start
         self.controller.reset(self.case.q0)
         for name in self.tasks:
             self.controller[name].gain = 1.0 / problem.dt
@@ -50,7 +47,6 @@ class Ours(Contender):
             self.controller[name].rate = problem.rate
         self.hand = self.controller[problem.frames[0]] if len(problem.frames) == 1 and not problem.com else None
         self.targets = [self._targets(k) for k in range(case.ticks)]
-        self.referee = Referee(case)
         self.reset()
 
     def reset(self) -> None:
@@ -112,18 +108,3 @@ class Ours(Contender):
 
     def state(self) -> Array:
         return self.q
-
-    def reference_error(self) -> float:
-        """Largest difference to an exact solution of the QP of this tick [rad/s or m/s]."""
-        tick = core_of(self.controller).tick
-        tick.q[:] = self.q
-        qp = tick.qp()
-        eye = np.eye(len(qp.g))
-        rows = np.vstack([eye, qp.A, -eye, -qp.A])
-        exact = exact_solution(qp.H, qp.g, rows, np.concatenate([qp.upper, -qp.lower]))
-        return float(np.abs(self.controller.step(self.q).v - exact).max())
-
-    def independent_error(self) -> float:
-        """As :meth:`reference_error`, of the QP that Pinocchio and numpy build; for ``calm=False``."""
-        exact = self.referee.velocity(self.q, self.tick)
-        return float(np.abs(self.controller.step(self.q).v - exact).max())

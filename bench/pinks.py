@@ -46,12 +46,9 @@ class Pink(Contender):
         for a, b in self.problem.pairs:
             geometry.addCollisionPair(pin.CollisionPair(solids[a], solids[b]))
         self.geometry = geometry
-        pairs = len(geometry.collisionPairs)
-        self.facts["pairs"] = float(pairs)
-        if self.problem.sensed:
-            pairs = min(pairs, self.problem.sensed)
+        pairs = min(len(geometry.collisionPairs), self.problem.sensed or np.inf)
         return pink.barriers.SelfCollisionBarrier(
-            pairs, gain=self.problem.rate, safe_displacement_gain=0.0, d_min=self.problem.margin
+            int(pairs), gain=self.problem.rate, safe_displacement_gain=0.0, d_min=self.problem.margin
         )
 
     def reset(self) -> None:

@@ -61,7 +61,6 @@ class Placo(Contender):
         names = [g.name for g in self.robot.collision_model.geometryObjects]
         solids = [names.index(solid_index(self.problem.solids, k)) for k in range(len(self.problem.solids))]
         pairs = [[solids[a], solids[b]] for a, b in self.problem.pairs]
-        self.facts["pairs"] = float(len(pairs))
         file = self.case.urdf.with_name("placo_pairs.json")
         file.write_text(json.dumps(pairs))
         self.robot.load_collision_pairs(str(file))

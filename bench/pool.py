@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import subprocess
@@ -26,13 +27,7 @@ class Worker:
     """One process with one package on one problem, see ``bench.worker``, or another module that serves as that does."""
 
     def __init__(
-        self,
-        python: str,
-        contender: str,
-        folder: Path,
-        core: int | None,
-        environment: Mapping[str, str] | None = None,
-        module: str = "bench.worker",
+        self, python: str, contender: str, folder: Path, core: int | None, module: str = "bench.worker"
     ) -> None:
         """Start the process; :attr:`ready` is what it said when it had built its problem."""
         self.contender = contender
@@ -45,7 +40,7 @@ class Worker:
             stderr=self._log,
             text=True,
             cwd=ROOT,
-            env={**user_environment(), "PYTHONPATH": str(ROOT), **(environment or {})},
+            env={**user_environment(), "PYTHONPATH": str(ROOT)},
         )
         self.ready = self._read()
 
@@ -96,6 +91,16 @@ def cores() -> tuple[int | None, str]:
     if len(available) < 2:
         return None, "one core, nothing pinned"
     return available[-1], f"workers pinned to core {available[-1]} of {len(available)}, one at a time"
+
+
+@contextlib.contextmanager
+def contest(pythons: Mapping[str, str], folder: Path, module: str = "bench.worker") -> Iterator[dict[str, Worker]]:
+    """A worker for each contender on the problem in a folder, all on one core."""
+    core, _ = cores()
+    with contextlib.ExitStack() as stack:
+        yield {
+            name: stack.enter_context(Worker(python, name, folder, core, module)) for name, python in pythons.items()
+        }
 
 
 def turns(names: Sequence[str], rounds: int) -> Iterator[tuple[int, str]]:

@@ -8,19 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from bench.descriptions import write_urdf
+from bench.descriptions import write_robot
 from bench.problems import Array, Problem, Solid, save
 from wbc.robot import Robot
 from wbc.robots import load
 
 #: Ticks of one pass, and how many of them the targets rest at the end
 TICKS, REST = 400, 60
-
-DESCRIPTIONS = Path(pin.__file__).parents[4] / "share" / "example-robot-data" / "robots"
 
 
 def prepare(folder: Path) -> list[Path]:
@@ -30,21 +29,12 @@ def prepare(folder: Path) -> list[Path]:
 
 def panda(folder: Path) -> Path:
     """A hand on a circle, with posture, position and velocity limits."""
-    write_urdf(
-        DESCRIPTIONS / "panda_description/urdf/panda.urdf",
-        folder / "robot.urdf",
-        locked=("panda_finger_joint1", "panda_finger_joint2"),
-    )
     robot = load("panda")
     q0 = np.array([0.0, -0.4, 0.0, -2.2, 0.0, 1.9, 0.8])
-    (home,) = placements(robot, q0, ["panda_hand"])
-    poses = np.stack([[circle(home, s, radius=0.12, tilt=0.3, offset=(0.0, 0.1, 0.05))] for s in phases()])
-    problem = Problem(
-        "panda", "Panda: pose of the hand, posture, position and velocity limits", robot="panda",
-        joints=joint_names(robot), frames=["panda_hand"], q0=q0.tolist(), length=robot.characteristic_length,
-    )  # fmt: skip
-    save(folder, problem, poses, np.zeros((TICKS, 3)))
-    return folder
+    home = robot.pose(q0, "panda_hand")
+    poses = [[circle(home, s, radius=0.12, tilt=0.3, offset=(0.0, 0.1, 0.05))] for s in phases(TICKS, REST)]
+    title = "Panda: pose of the hand, posture, position and velocity limits"
+    return write(folder, title, robot, q0, ["panda_hand"], poses, robot="panda")
 
 
 def ur5(folder: Path) -> Path:
@@ -56,59 +46,43 @@ def ur5(folder: Path) -> Path:
     solids = [Solid(link, "sphere", [radius], place) for link, (place, radius) in links.items()]
     robot = load("ur5")
     q0 = np.array([0.0, -1.2, 1.9, -2.27, -1.57, 0.0])
-    (home,) = placements(robot, q0, ["tool0"])
-    poses = np.stack([[circle(home, s, radius=0.12, tilt=0.2, offset=(0.0, 0.05, 0.03))] for s in phases()])
+    home = robot.pose(q0, "tool0")
+    poses = [[circle(home, s, radius=0.12, tilt=0.2, offset=(0.0, 0.05, 0.03))] for s in phases(TICKS, REST)]
     for offset, radius in (((0.05, -0.21, 0.03), 0.05), ((-0.14, 0.24, 0.05), 0.06), ((-0.05, 0.0, -0.24), 0.08)):
         solids.append(Solid("", "sphere", [radius], (home.translation + np.array(offset)).tolist()))
-    write_urdf(DESCRIPTIONS / "ur_description/urdf/ur5_robot.urdf", folder / "robot.urdf", solids=solids)
-    problem = Problem(
-        "ur5", "UR5: pose of the tool, posture, limits, 4 link spheres against 3 obstacles", robot="ur5",
-        joints=joint_names(robot), frames=["tool0"], q0=q0.tolist(), length=robot.characteristic_length,
-        solids=solids, pairs=[(a, b) for a in range(len(links)) for b in range(len(links), len(solids))],
-    )  # fmt: skip
-    save(folder, problem, poses, np.zeros((TICKS, 3)))
-    return folder
+    title = "UR5: pose of the tool, posture, limits, 4 link spheres against 3 obstacles"
+    return write(folder, title, robot, q0, ["tool0"], poses, robot="ur5", solids=solids, pairs=against_fixed(solids))
 
 
 def talos(folder: Path) -> Path:
     """Feet at rest, hands on circles, the centre of mass to and fro; floating base, posture and limits."""
-    write_urdf(DESCRIPTIONS / "talos_data/robots/talos_reduced.urdf", folder / "robot.urdf")
     robot = load("talos")
-    names = joint_names(robot)
     sitting = {
         "arm_left_1": 0.25847, "arm_left_2": 0.173046, "arm_left_4": -0.525366, "arm_right_1": -0.25847,
         "arm_right_2": -0.173046, "arm_right_4": -0.525366, "leg_left_3": -0.411354, "leg_left_4": 0.859395,
         "leg_left_5": -0.448041, "leg_right_3": -0.411354, "leg_right_4": 0.859395, "leg_right_5": -0.448041,
     }  # fmt: skip
-    joints = [sitting.get(name.removesuffix("_joint"), 0.0) for name in names]
+    joints = [sitting.get(name.removesuffix("_joint"), 0.0) for name in robot.joint_names[1:]]
     lower, upper = robot.limits.position_lower[6:], robot.limits.position_upper[6:]
     q0 = np.concatenate([[0.0, 0.0, 1.01927, 0.0, 0.0, 0.0, 1.0], np.clip(joints, lower + 0.02, upper - 0.02)])
-    feet = ["left_sole_link", "right_sole_link"]
-    hands = ["wrist_left_ft_link", "wrist_right_ft_link"]
-    homes = placements(robot, q0, feet + hands)
+    frames = ["left_sole_link", "right_sole_link", "wrist_left_ft_link", "wrist_right_ft_link"]
+    homes = [robot.pose(q0, frame) for frame in frames]
     offsets = ((0.05, 0.02, 0.05), (0.05, -0.02, 0.05))
-    poses = np.stack(
-        [
-            [p.homogeneous for p in homes[:2]]
-            + [circle(p, s, radius=0.05, tilt=0.15, offset=o) for p, o in zip(homes[2:], offsets, strict=True)]
-            for s in phases()
-        ]
-    )
+    poses = [
+        [home.homogeneous for home in homes[:2]]
+        + [circle(p, s, radius=0.05, tilt=0.15, offset=o) for p, o in zip(homes[2:], offsets, strict=True)]
+        for s in phases(TICKS, REST)
+    ]
     start = np.array(pin.centerOfMass(robot.model, robot.model.createData(), q0))
-    com = np.stack([start + np.array([0.0, 0.02 * np.sin(2 * np.pi * s), -0.02]) for s in phases()])
-    problem = Problem(
-        "talos", "Talos: 4 poses, centre of mass, posture, limits, floating base", robot="talos", joints=names,
-        frames=feet + hands, q0=q0.tolist(), length=robot.characteristic_length, floating=True, com=True,
-        posture_weight=1e-4,
-    )  # fmt: skip
-    save(folder, problem, poses, com)
-    return folder
+    com = [start + np.array([0.0, 0.02 * np.sin(2 * np.pi * s), -0.02]) for s in phases(TICKS, REST)]
+    title = "Talos: 4 poses, centre of mass, posture, limits, floating base"
+    return write(folder, title, robot, q0, frames, poses, com, robot="talos", com=True, posture_weight=1e-4)
 
 
-def phases() -> Array:
+def phases(ticks: int, rest: int) -> Array:
     """Where on its closed figure the target is at each tick: from 0 to 1, smooth at the end, then at rest."""
-    moving = np.linspace(0.0, 1.0, TICKS - REST)
-    return np.concatenate([np.sin(0.5 * np.pi * moving), np.ones(REST)])
+    moving = np.linspace(0.0, 1.0, ticks - rest)
+    return np.concatenate([np.sin(0.5 * np.pi * moving), np.ones(rest)])
 
 
 def circle(home: pin.SE3, s: float, *, radius: float, tilt: float, offset: Sequence[float]) -> Array:
@@ -119,13 +93,20 @@ def circle(home: pin.SE3, s: float, *, radius: float, tilt: float, offset: Seque
     return np.array(pin.SE3(rotation, position).homogeneous)
 
 
-def placements(robot: Robot, q: Array, frames: Sequence[str]) -> list[pin.SE3]:
-    """Poses of frames in the world."""
-    data = robot.model.createData()
-    pin.framesForwardKinematics(robot.model, data, q)
-    return [pin.SE3(data.oMf[robot.model.getFrameId(f)]) for f in frames]
+def against_fixed(solids: Sequence[Solid]) -> list[tuple[int, int]]:
+    """Pairs of each solid on a link with each in the world."""
+    numbers = range(len(solids))
+    return [(a, b) for b in numbers for a in numbers if solids[a].link and not solids[b].link]
 
 
-def joint_names(robot: Robot) -> list[str]:
-    """The one-dof joints in Pinocchio's order."""
-    return [str(robot.model.names[j]) for j in range(1, robot.model.njoints) if int(robot.model.nvs[j]) == 1]
+def write(
+    folder: Path, title: str, of: Robot, q0: Array, frames: Sequence[str], poses: Any, centres: Any = None, **more: Any
+) -> Path:
+    """Write a problem of a robot and return its folder; ``more``: other fields of :class:`~bench.problems.Problem`."""
+    write_robot(of, folder / "robot.urdf", more.get("solids", ()))
+    problem = Problem(
+        folder.name, title, joints=[str(name) for name in of.joint_names if name != "root_joint"], frames=list(frames),
+        q0=q0.tolist(), length=of.characteristic_length, floating=of.base == "floating", **more,
+    )  # fmt: skip
+    save(folder, problem, np.array(poses), np.zeros((len(poses), 3)) if centres is None else np.array(centres))
+    return folder

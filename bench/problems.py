@@ -42,11 +42,12 @@ class Problem:
     Attributes:
         name: short name.
         title: what is asked, in one line.
-        robot: name that ``wbc.robots.load`` takes.
+        robot: name that ``wbc.robots.load`` takes; "": it is loaded from the URDF.
         floating: whether the root is a free joint.
         joints: the one-dof joints in Pinocchio's order.
         frames: frames with a pose task.
         com: whether there is a centre-of-mass task.
+        q0: first configuration: base position and quaternion (x, y, z, w) if floating, then the joints.
         length: metres that weigh as much as one radian [m].
         posture_weight: weight of the posture task; pose and centre-of-mass tasks have weight 1.
         damping: added to the diagonal of the Hessian.
@@ -56,16 +57,15 @@ class Problem:
         solids: collision shapes, on links and in the world; :attr:`pairs` says which keep clear.
         pairs: pairs of indices into :attr:`solids`.
         sensed: rows for the nearest pairs, which Coal measures (this package); 0: every pair has a row of its own.
-        q0: first configuration: base position and quaternion (x, y, z, w) if floating, then the joints.
     """
 
     name: str
     title: str
-    robot: str
     joints: list[str]
     frames: list[str]
     q0: list[float]
     length: float
+    robot: str = ""
     floating: bool = False
     com: bool = False
     posture_weight: float = 1e-3

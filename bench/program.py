@@ -47,11 +47,6 @@ def measure(work: dict[str, tuple[int, Iterator[Record]]], progress: Progress) -
     return found, None
 
 
-def page(sheets: Sequence[Sheet], notes: Sequence[str]) -> str:
-    """Tables and notes in Markdown."""
-    return "\n\n".join([*(sheet.markdown() for sheet in sheets), *notes]) + "\n"
-
-
 def publish(file: Path, sheets: Sequence[Sheet], notes: Sequence[str], data: dict[str, Any], width: int = 160) -> None:
     """Print tables and notes, and write them to ``file``.md, and what they are made of to ``file``.json."""
     console = terminal(width)
@@ -61,6 +56,6 @@ def publish(file: Path, sheets: Sequence[Sheet], notes: Sequence[str], data: dic
     for note in notes:
         console.print(note, markup=False, highlight=False)
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.with_suffix(".md").write_text(page(sheets, notes))
+    file.with_suffix(".md").write_text("\n\n".join([*(sheet.markdown() for sheet in sheets), *notes]) + "\n")
     file.with_suffix(".json").write_text(json.dumps(data, indent=1) + "\n")
     console.print(f"Written to {file}.md", markup=False, highlight=False)

@@ -43,7 +43,6 @@ def notes(results: dict[str, Any]) -> list[str]:
     listed = ", ".join(f"{name} {version}" for name, version in versions.items())
     return [
         f"{about['processor']}, Python {about['python']}; {about['cores']}; load {about['load']}.",
-        f"Garbage collector {about['garbage collector']}; {about['threads']}.",
         listed + ".",
         CALLS,
         *((cycles.NOTE,) if results.get("problems") else ()),

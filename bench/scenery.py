@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import coal
 import numpy as np
 import pinocchio as pin
 
 from bench.problems import Array, Solid
-from bench.solids import placement
+from bench.solids import placement, shape
+from tests.distances import coal_pose, coal_shape
 from wbc.robot import Robot
 from wbc.shapes import Capsule, Sphere
 
@@ -45,16 +46,11 @@ def capsules(robot: Robot) -> list[Solid]:
     """The spheres and capsules of all links that joints move."""
     out = []
     for link, shapes in robot.shapes.items():
-        if robot.model.frames[robot.model.getFrameId(link)].parentJoint == 0:
-            continue
-        for placed in shapes:
-            size = [placed.shape.radius]
-            if isinstance(placed.shape, Capsule):
-                size.append(placed.shape.length)
-            else:
-                assert isinstance(placed.shape, Sphere), placed.shape
-            numbers = pin.SE3ToXYZQUAT(placed.placement).tolist()
-            kind = "capsule" if len(size) == 2 else "sphere"
+        for placed in shapes if robot.model.frames[robot.model.getFrameId(link)].parentJoint else ():
+            shape, numbers = placed.shape, pin.SE3ToXYZQUAT(placed.placement).tolist()
+            assert isinstance(shape, Capsule | Sphere), shape
+            size = [shape.radius, shape.length] if isinstance(shape, Capsule) else [shape.radius]
+            kind = type(shape).__name__.lower()
             out.append(Solid(link, kind, [float(s) for s in size], numbers[:3], numbers[3:]))
     return out
 
@@ -75,17 +71,17 @@ def boxes_around(robot: Robot, own: Sequence[Solid], path: Sequence[Array], coun
     return _around(robot, own, path, count, lambda place, turn: Solid("", "box", CRATE, place, turn))
 
 
-def _around(robot: Robot, own: Sequence[Solid], path: Sequence[Array], count: int, make: object) -> list[Solid]:
+def _around(
+    robot: Robot, own: Sequence[Solid], path: Sequence[Array], count: int,
+    make: Callable[[list[float], list[float]], Solid],
+) -> list[Solid]:  # fmt: skip
     """Candidates at random within reach, those nearer than :data:`CLEAR` left out."""
-    assert callable(make)
-    rng = np.random.default_rng(3)
+    rng, pairs = np.random.default_rng(3), [(k, len(own)) for k in range(len(own))]
     found: list[tuple[float, Solid]] = []
     while len(found) < count:
         turn = rng.normal(size=4)
         solid = make(rng.uniform([-0.9, -0.9, 0.0], [0.9, 0.9, 1.2]).tolist(), (turn / np.linalg.norm(turn)).tolist())
-        solids = [*own, solid]
-        pairs = [(k, len(own)) for k in range(len(own))]
-        least = min(float(clearances(robot, solids, pairs, q).min()) for q in path[::10])
+        least = min(float(clearances(robot, [*own, solid], pairs, q).min()) for q in path[::10])
         if least > CLEAR:
             found.append((least, solid))
     return [solid for _, solid in sorted(found, key=lambda one: one[0])]
@@ -112,18 +108,10 @@ def measured(
     for k in used:
         solid = solids[k]
         place = data.oMf[model.getFrameId(solid.link)] * placement(solid) if solid.link else placement(solid)
-        places[k] = coal.Transform3s(place.rotation, place.translation)
-        shapes[k] = _coal(solid)
+        places[k] = coal_pose(place)
+        shapes[k] = coal_shape(shape(solid))
     out, request = [], coal.DistanceRequest()
     for a, b in pairs:
         out.append(coal.DistanceResult())
         coal.distance(shapes[a], places[a], shapes[b], places[b], request, out[-1])
     return out
-
-
-def _coal(solid: Solid) -> coal.CollisionGeometry:
-    if solid.kind == "sphere":
-        return coal.Sphere(solid.size[0])
-    if solid.kind == "capsule":
-        return coal.Capsule(solid.size[0], solid.size[1])
-    return coal.Box(*solid.size)

@@ -2,7 +2,7 @@
 
     {"do": "time", "ticks": 400}    ->  {"call": [ns, ...], "cycle": [ns, ...], ...}
     {"do": "export", "folder": "..."}  ->  {"done": true}             the tick as C and a path, see bench.code
-    {"do": "open", "folder": "..."} ->  {"facts": {...}}                another problem instead
+    {"do": "open", "folder": "..."} ->  {"done": true}                  another problem instead
     {"do": "sample", "budget": 0.3} ->  {"call": [ns, ...], "states": [[...], ...]}
                                         as many ticks of one pass as take that long [s]
 
@@ -92,26 +92,18 @@ def time_sample(contender: Contender, budget: float) -> dict[str, Any]:
     return {"call": out, "states": states}
 
 
-def opened(name: str, folder: Path) -> Contender:
-    """The contender of that name on the problem in a folder; ``facts`` say how long that took."""
-    start = perf_counter()
-    contender = build(name, load(folder))
-    contender.facts = {"build": perf_counter() - start} | contender.facts
-    return contender
-
-
 class Served:
     """The contender of a name on the problem that is open, and its answers to commands."""
 
     def __init__(self, name: str, folder: Path) -> None:
-        self.name, self.contender = name, opened(name, folder)
+        self.name, self.contender = name, build(name, load(folder))
 
     def answer(self, command: dict[str, Any]) -> dict[str, Any]:
         """What a command is answered with."""
         if command["do"] == "open":
-            self.contender = opened(self.name, Path(command["folder"]))
+            self.contender = build(self.name, load(Path(command["folder"])))
             gc.collect()
-            return {"facts": self.contender.facts}
+            return {"done": True}
         if command["do"] == "time":
             return time_calls(self.contender, command["ticks"])
         if command["do"] == "sample":
@@ -120,11 +112,10 @@ class Served:
 
 
 def main() -> None:
-    """Build, say how long that took, then serve."""
+    """Build, say so, then serve."""
     name, folder, *core = sys.argv[1:]
     begin(core)
-    served = Served(name, Path(folder))
-    serve(served.answer, {"ready": name, "facts": served.contender.facts})
+    serve(Served(name, Path(folder)).answer, {"ready": name})
 
 
 if __name__ == "__main__":

@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 from wbc.errors import ShapeError
 from wbc.multibody import pin
 from wbc.robot import Robot
+from wbc.robot.geometry.link_balls import LinkBalls
 from wbc.validation import Array
 
 #: A frame no farther from a ball's centre than this is it, as descriptions place them [radii]
@@ -46,9 +47,9 @@ def ball_radius(robot: Robot, frame: str) -> float:
     """
     robot.check_frame("frame", frame)
     origin = robot.model.frames[robot.model.getFrameId(frame)].placement.translation
-    centers, radii = _balls(robot, frame)
-    central = np.linalg.norm(centers - origin, axis=1) <= CENTRAL * radii
-    return float(radii[central].max(initial=0.0))
+    balls = _balls(robot, frame)
+    central = np.linalg.norm(balls.centers - origin, axis=1) <= CENTRAL * balls.radii
+    return float(balls.radii[central].max(initial=0.0))
 
 
 def sole_of(robot: Robot, frame: str) -> Sole:
@@ -59,8 +60,8 @@ def sole_of(robot: Robot, frame: str) -> Sole:
         UnknownNameError: no such frame. ShapeError: no shapes, or a sole that is no rectangle to stand on.
     """
     robot.check_frame("frame", frame)
-    centers, radii = _balls(robot, frame)
-    if not len(centers):
+    balls = _balls(robot, frame)
+    if not len(balls.radii):
         raise ShapeError("sole", frame, "no collision body moves with this frame, so nothing says where its sole is")
     model, data = robot.model, robot.model.createData()
     pin.framesForwardKinematics(model, data, robot.neutral)
@@ -69,9 +70,9 @@ def sole_of(robot: Robot, frame: str) -> Sole:
     down, ahead = (data.oMi[at.parentJoint].rotation.T @ body @ way for way in (-np.eye(3)[2], np.eye(3)[0]))
     normal = down
     for _ in range(3):
-        points = centers + radii[:, None] * normal
+        points = balls.centers + balls.radii[:, None] * normal
         normal = _facing(points, down)
-    points = centers + radii[:, None] * normal
+    points = balls.centers + balls.radii[:, None] * normal
     depth = float((points @ normal).max())
     flat = points[points @ normal >= depth - SOLE]
     x = ahead - (ahead @ normal) * normal
@@ -91,21 +92,15 @@ def sole_of(robot: Robot, frame: str) -> Sole:
     return Sole(at.placement.inverse() * pin.SE3(turn, place), (float(half[0]), float(half[1])))
 
 
-def _balls(robot: Robot, frame: str) -> tuple[Array, Array]:
-    """Centres ``(n, 3)``, in the axes of the frame's joint, and radii ``(n)`` of balls whose hull is that of the shapes
-    that move with it; corners have the radius 0 [m].
-    """
-    model, centers, radii = robot.model, [np.zeros((0, 3))], [np.zeros(0)]
-    joint = model.frames[model.getFrameId(frame)].parentJoint
+def _balls(robot: Robot, frame: str) -> LinkBalls:
+    """Balls whose hull is that of the shapes that move with a frame, in the axes of its joint."""
+    frames, parts = robot.model.frames, [LinkBalls(np.zeros((0, 3)), np.zeros(0))]
+    joint = frames[robot.model.getFrameId(frame)].parentJoint
     for link, shapes in robot.shapes.items():
-        on = model.frames[model.getFrameId(link)]
-        for placed in shapes if on.parentJoint == joint else ():
-            round_ = placed.shape.is_round
-            pose = on.placement if round_ else on.placement * placed.placement
-            own = np.stack(placed.capsule()[:2]) if round_ else placed.shape.triangles().reshape(-1, 3)
-            centers.append(own @ pose.rotation.T + pose.translation)
-            radii.append(np.full(len(own), placed.capsule()[2] if round_ else 0.0))
-    return np.concatenate(centers), np.concatenate(radii)
+        on = frames[robot.model.getFrameId(link)]
+        if on.parentJoint == joint:
+            parts += [LinkBalls.of(placed.shape).moved(on.placement * placed.placement) for placed in shapes]
+    return LinkBalls(np.concatenate([own.centers for own in parts]), np.concatenate([own.radii for own in parts]))
 
 
 def _facing(points: Array, down: Array) -> Array:

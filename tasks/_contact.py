@@ -108,6 +108,10 @@ class Contact(Constraint):
         """components x 6: the wrench in the axes of the frame, about its origin, that each component is the size of."""
         return ca.SX.eye(6)[list(self.axes), :]
 
+    def sizes(self, robot: Robot) -> NDArray[np.float64]:
+        """How much of each component counts as much as 1 rad/s^2 ``(components)`` [N; N m]: :func:`force_sizes`."""
+        return force_sizes(robot)[list(self.axes)]
+
     def limits(self) -> tuple[Input, ...]:
         """Run-time inputs of :meth:`cone`."""
         raise TypeError(f"{type(self).__name__} declares no limits")
@@ -200,8 +204,9 @@ class ContactForce(Task):
         )
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
-        sizes = force_sizes(robot)
-        return tuple(Row(WRENCH_LABELS[k], WRENCH_UNITS[k], float(sizes[k])) for k in self.contact.axes)
+        sizes = self.contact.sizes(robot).tolist()
+        axes = self.contact.axes
+        return tuple(Row(WRENCH_LABELS[k], WRENCH_UNITS[k], size) for k, size in zip(axes, sizes, strict=True))
 
 
 @dataclass(frozen=True)

@@ -76,8 +76,9 @@ class LinkageSpeed(Constraint):
     say so, as a slow one takes along others that cannot stop as soon. E leaves as much for bends that grow on the way.
     The row of a joint is the line over dt + t, with s and c t^2 to first order about the speed along v0 at which the
     joint comes to its limit but for c, of those that A lets it reach; no row asks for more than braking by D does, or
-    by what of it bends leave within A. Where accelerations are commanded a tick moves by (v0 + v) dt / 2, and
-    q + v0 dt / 2 is in place of q: what brakes then stays within the line as before.
+    by what of it bends leave within A. A linkage of one motion turns back no faster than it stops before the limit
+    behind. Where accelerations are commanded a tick moves by (v0 + v) dt / 2, and q + v0 dt / 2 is in place of q: what
+    brakes then stays within the line as before.
 
     Attributes:
         limits: whose limits they are.
@@ -143,34 +144,48 @@ class LinkageSpeed(Constraint):
         slow = 0.5 * (ticks * near + ca.sqrt((ticks * near) ** 2 + 2.0 / BRAKE * near))
         slow = ca.fmax(ca.sqrt(size / SHARE), speed * slow)
         most = ca.dot(along, dt * asked) + ca.fmax(speed / slow, speed - braking) - (rest / speed) ** 3 * rest
-        sides = [(along, most)]
+        slowing = [(along, most)]
         if _turns(linkage):
             steeper = 0.5 * speed / size * bend.steeper(asked / weights / size)
             turned = ca.fmax(speed / ca.sqrt(size / SHARE), speed - braking)
-            sides.append((steeper, ca.dot(steeper, dt * asked) + turned))
-        slowed, first = ca.logic_and(size > SLIGHT, regular), len(sides)
+            slowing.append((steeper, ca.dot(steeper, dt * asked) + turned))
+        slowed, first = ca.logic_and(size > SLIGHT, regular), len(slowing)
         matrix = ca.SX(first + len(ended), robot.nv)
-        matrix[:first, dofs] = unit * ca.horzcat(*[row for row, _ in sides]).T
-        lower, upper = [-ca.SX.inf(first)], [ca.if_else(slowed, unit * side, ca.inf) for _, side in sides]
+        matrix[:first, dofs] = unit * ca.horzcat(*[row for row, _ in slowing]).T
+        lower, upper = [-ca.SX.inf(first)], [ca.if_else(slowed, unit * side, ca.inf) for _, side in slowing]
         braked = (1.0 - braking / ca.fmax(speed, braking)) * kin.v[dofs] + dt * asked
         reach = len(dofs) ** 0.25 * dt
         for k, dof in enumerate(ended, first):
             place, v_joint = dofs.index(dof), kin.v[dof]
             begins = kin.q[int(robot.position_index[dof])] + moved * dt * v_joint
-            room = ca.if_else(
-                v_joint > 0.0, float(kept.position_upper[dof]) - begins, begins - kept.position_lower[dof]
-            )
-            fastest = ca.sqrt(dt**2 + 2.0 / STOP * ca.fmax(room, 0.0) / (ca.fabs(v_joint) / speed + LEAST)) - dt
-            about = ca.fmax(ca.fmin(ca.fmax(STOP * fastest, speed - reach), speed + reach), 0.0)
+            up, down = float(kept.position_upper[dof]) - begins, begins - float(kept.position_lower[dof])
+            ahead_is_up, share = v_joint > 0.0, ca.fabs(v_joint) / speed + LEAST
+            about = _stopping(ca.if_else(ahead_is_up, up, down), share, dt)
+            about = ca.fmax(ca.fmin(ca.fmax(about, speed - reach), speed + reach), 0.0)
             stops, bent = 0.5 / STOP * about, asked[place] * (about / speed) ** 2
             row = (0.5 / STOP * v_joint / speed * about + bent * stops / STOP) * along
             ahead = about / speed * ca.dot(row, kin.v[dofs]) - 0.5 * bent * stops**2 - begins
             row[place] += dt + stops
             row, ahead = row / (dt + stops), ahead / (dt + stops)
-            least = ca.dot(row, braked)
+            least, ends = ca.dot(row, braked), (kept.position_lower, kept.position_upper)
+            sides = [ahead + float(end[dof]) / (dt + stops) for end in ends]
+            if not _turns(linkage):
+                # Its velocities are along v0: against it no faster than what stops before the limit behind
+                pace = _norm(v, AT_REST * rest)
+                share, room, forth = (
+                    ca.fabs(v_joint) / pace + LEAST,
+                    ca.if_else(ahead_is_up, down, up),
+                    ca.dot(row, kin.v[dofs]),
+                )
+                forth = ca.if_else(pace > 2.0 * AT_REST * rest, forth, 0.0)
+                back = ca.fmin(_stopping(room, share, dt), reach)
+                room -= 0.5 * ca.fabs(asked[place]) * (0.5 / STOP * back**2 / speed) ** 2
+                back = -ca.fmin(_stopping(room, share, dt), reach) / pace * forth
+                sides[0] = ca.if_else(ca.logic_and(ahead_is_up, forth > 0.0), back, sides[0])
+                sides[1] = ca.if_else(ca.logic_and(v_joint < 0.0, forth < 0.0), back, sides[1])
             matrix[k, dofs] = row.T
-            lower.append(ca.fmin(ahead + float(kept.position_lower[dof]) / (dt + stops), least))
-            upper.append(ca.fmax(ahead + float(kept.position_upper[dof]) / (dt + stops), least))
+            lower.append(ca.fmin(sides[0], least))
+            upper.append(ca.fmax(sides[1], least))
         return matrix, ca.vertcat(*lower), ca.vertcat(*upper)
 
 
@@ -229,6 +244,11 @@ def bend_of(robot: Robot, kin: Tracer, linkage: Linkage, limits: Array) -> Bend:
 def _turns(linkage: Linkage) -> bool:
     """Whether it moves in more ways than one, and may turn to others."""
     return len(linkage.dofs) - linkage.held > 1
+
+
+def _stopping(room: ca.SX, share: ca.SX, dt: ca.SX) -> ca.SX:
+    """The speed s from which a joint with v = share * s stops after ``room``, but for the bend."""
+    return STOP * (ca.sqrt(dt**2 + 2.0 / STOP * ca.fmax(room, 0.0) / share) - dt)
 
 
 def _norm(x: ca.SX, least: ca.SX | float) -> ca.SX:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from bench.harness import OURS, statistics
-from bench.pool import Worker, cores
+from bench.harness import OURS, pythons, statistics
+from bench.pool import contest, cores
 from bench.problems import Array, load
 from bench.sheet import Sheet
 
@@ -37,12 +35,12 @@ TURNS, ROUNDS, COUNTED = 10, 5, 4
 
 def measure(problem: Path, rounds: int | None, say: Callable[[str], None]) -> dict[str, Any]:
     """Everything of the problem in a folder; times in nanoseconds, instructions of one tick."""
-    case, (core, _) = load(problem), cores()
-    name, work = problem.name, (problem / "code").absolute()
+    case, name, work = load(problem), problem.name, (problem / "code").absolute()
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir(parents=True)
     turns = rounds or TURNS
-    with Worker(sys.executable, OURS, problem, core) as worker:
+    with contest(pythons(None), problem) as workers:
+        worker = workers[OURS]
         say(f"{name}: exporting")
         worker.ask("export", folder=str(work))
         folders = {}
@@ -55,7 +53,7 @@ def measure(problem: Path, rounds: int | None, say: Callable[[str], None]) -> di
         for turn in range(turns):
             say(f"{name}: the tick as C and in Python, turn {turn + 1} of {turns}")
             for label, folder in folders.items():
-                some, agree[label] = timed(folder, work / "path.bin", core)
+                some, agree[label] = timed(folder, work / "path.bin")
                 spent[label].append(some)
             for _ in range(ROUNDS):
                 answer = worker.ask("time", ticks=case.ticks)
@@ -107,16 +105,12 @@ def build(source: Path, folder: Path, options: tuple[str, ...]) -> Path:
     return folder
 
 
-def timed(folder: Path, path: Path, core: int | None) -> tuple[Array, dict[str, float]]:
+def timed(folder: Path, path: Path) -> tuple[Array, dict[str, float]]:
     """Time of every tick [ns], and how far commands are from Python's."""
-    times = folder / "times.bin"
-
-    def pin() -> None:
-        if core is not None:
-            os.sched_setaffinity(0, {core})
-
-    command = ["./cycles", str(path), str(ROUNDS), str(times)]
-    done = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True, preexec_fn=pin)
+    times, (core, _) = folder / "times.bin", cores()
+    pinned = [] if core is None else ["taskset", "-c", str(core)]
+    command = [*pinned, "./cycles", str(path), str(ROUNDS), str(times)]
+    done = subprocess.run(command, cwd=folder, check=True, capture_output=True, text=True)
     bad, largest, reading = (float(word) for word in done.stdout.split())
     return np.fromfile(times), {"not solved": bad, "difference": largest, "read ns": reading}
 

@@ -46,7 +46,7 @@ class Course:
     """The controller, the run-time inputs of every tick, and where the hands are wanted then."""
 
     def __init__(self, case: Case) -> None:
-        self.name, self.kind, self.q0 = case.problem.name, KINDS[case.problem.name], case.q0
+        self.name, self.kind, self.q0 = case.problem.robot, KINDS[case.problem.robot], case.q0
         robot = wbc.robots.load(self.name)
         stack = wbc.Stack(robot, DT)
         for frame in case.problem.frames:

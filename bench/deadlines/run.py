@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-import sys
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
+from time import perf_counter_ns
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
-from bench.deadlines.course import DT, HOLD, TICKS
+from bench.deadlines.course import DT, HOLD, TICKS, Course
 from bench.harness import statistics
-from bench.pool import Worker, cores
+from bench.problems import load
 from bench.sheet import Sheet, us
+from wbc.controller import core_of
 
 TURNS = 10
 
@@ -30,25 +33,63 @@ targets, over all ticks. A cap bounds the time of a tick; a capped tick misses r
 
 def measure(problem: Path, rounds: int | None, say: Callable[[str], None]) -> dict[str, Any]:
     """All caps on the course of the problem in a folder."""
-    name, (core, _) = problem.name, cores()
-    turns, spent = rounds or TURNS, dict[str, list[list[float]]]()
+    name, turns = problem.name, rounds or TURNS
     say(f"{name}: deadlines, compiling")
-    with Worker(sys.executable, name, problem, core, module="bench.deadlines.worker") as worker:
-        caps = worker.ready["caps"]
-        walks = [worker.ask("walk", cap=cap) for cap in caps]
-        for turn in range(turns):
-            say(f"{name}: deadlines, turn {turn + 1} of {turns}")
-            for cap in caps:
-                spent.setdefault(str(cap), []).append(worker.ask("time", cap=cap)["native"])
+    course = Course(load(problem))
+    caps = course.kind.caps
+    walks, spent = [walk(course, cap) for cap in caps], dict[int | None, list[list[int]]]()
+    for turn in range(turns):
+        say(f"{name}: deadlines, turn {turn + 1} of {turns}")
+        for cap in caps:
+            spent.setdefault(cap, []).append(durations(course, cap))
     rows = []
     for cap, walked in zip(caps, walks, strict=True):
-        times = np.array(spent[str(cap)])
+        times = np.array(spent[cap])
         shares = {status: count / TICKS for status, count in walked["statuses"].items()}
         rows.append({
             "cap": cap, "times": statistics(times.ravel()), "least": statistics(times.min(axis=0)), "shares": shares,
             "error": walked["error"], "margin": walked["margin"],
         })  # fmt: skip
     return {"rows": rows, "ticks": TICKS * turns}
+
+
+def walk(course: Course, cap: int | None) -> dict[str, Any]:
+    """One closed loop: statuses, iterations, distances of the hands from their targets, least margin [m]."""
+    c, q = begin(course, cap)
+    statuses: Counter[str] = Counter()
+    iterations, errors, least = [], np.zeros(TICKS), np.inf
+    for k in range(TICKS):
+        core_of(c).tick.p[:] = course.inputs[k]
+        step = c.step(q)
+        statuses[str(step.status)] += 1
+        iterations.append(int(step.iterations))
+        least = min(least, *(min(step.margins[name]) for name in course.balls))
+        q = pin.integrate(course.model, q, step.v * DT)
+        places = [course.place(q, hand).translation for hand in course.kind.hands]
+        errors[k] = np.linalg.norm(np.array(places) - course.wanted[k], axis=1).mean()
+    return {"statuses": statuses, "iterations": iterations, "error": float(errors.mean()), "margin": float(least)}
+
+
+def durations(course: Course, cap: int | None) -> list[int]:
+    """Durations of the native call in the same closed loop [ns]."""
+    c, q = begin(course, cap)
+    tick, out = core_of(c).tick, []
+    for k in range(TICKS):
+        tick.p[:] = course.inputs[k]
+        tick.q[:] = q
+        start = perf_counter_ns()
+        tick.step_function(tick.pointer)
+        out.append(perf_counter_ns() - start)
+        q = pin.integrate(course.model, q, c.last_command * DT)
+    return out
+
+
+def begin(course: Course, cap: int | None) -> tuple[Any, np.ndarray]:
+    """The controller at the start."""
+    c = course.controller
+    c.iteration_cap = cap
+    c.reset(course.q0)
+    return c, np.array(course.q0)
 
 
 def sheet(courses: dict[str, Any]) -> Sheet:

@@ -1,9 +1,8 @@
 """``python -m bench.figures``: measure again what pages say, and write it into their blocks.
 
 A figure is a file of tables and sentences that one command wrote. Without arguments the figures that take at most
---minutes are measured, one after the other; then all blocks are written. --write only writes the blocks, --list says
-what there is. --check changes nothing: it says which blocks differ from their file, which figures are older than the
-code that they measure, and which numbers stand in no block. It ends with 1 if there is any.
+--minutes are measured, one after the other; then all blocks are written. --write only writes the blocks; --list says
+what there is, and which figures are older than the code that they measure.
 """
 
 from __future__ import annotations
@@ -13,8 +12,8 @@ import importlib
 import subprocess
 import sys
 
-from bench.figures import pages, store
-from bench.figures.index import FIGURES, Figure, render, write_blocks
+from bench.figures import store
+from bench.figures.index import FIGURES, Figure, write_blocks
 from bench.pool import ROOT
 from wbc.interrupts import obey_interrupts
 
@@ -40,38 +39,19 @@ def age(figure: Figure) -> str:
     return f"older than {files[0]}" + (f" and {len(files) - 1} more" if len(files) > 1 else "") if files else ""
 
 
-def check() -> int:
-    """Print what is not as it should be; the exit status."""
-    bad = 0
-    for page in pages.all_pages():
-        name, text = page.relative_to(ROOT).as_posix(), page.read_text()
-        faults = ["a block differs from its file: --write"] if pages.rendered(text, render) != text else []
-        for fault in [*faults, *(f"in no block: {line}" for line in pages.loose(text))]:
-            print(f"{name}: {fault}")
-            bad += 1
-    for figure in FIGURES.values():
-        if told := age(figure):
-            print(f"{figure.name}: {told}  ({figure.told}, {figure.minutes:g} min)")
-            bad += 1
-    return int(bad > 0)
-
-
-def main(given: list[str] | None = None) -> int:
-    """Parse the arguments and run; the exit status."""
+def main() -> None:
+    """Parse the arguments and run."""
     parser = argparse.ArgumentParser(prog="python -m bench.figures", description=__doc__)
     parser.add_argument("--only", nargs="+", metavar="NAME", choices=list(FIGURES), help="measure these")
     parser.add_argument("--minutes", type=float, default=5.0, help="measure what takes at most so long; default: 5")
     parser.add_argument("--stale", action="store_true", help="of these, what is older than its code")
     parser.add_argument("--write", action="store_true", help="measure nothing, write the blocks")
-    parser.add_argument("--check", action="store_true", help="measure and write nothing")
     parser.add_argument("--list", action="store_true", help="figures, minutes, commands and ages")
-    asked = parser.parse_args(given)
-    if asked.check:
-        return check()
+    asked = parser.parse_args()
     if asked.list:
         for figure in FIGURES.values():
             print(f"{figure.name:14} {figure.minutes:5g} min  {figure.told:60} {age(figure)}")
-        return 0
+        return
     chosen = [FIGURES[n] for n in asked.only or ()] or [f for f in FIGURES.values() if f.minutes <= asked.minutes]
     chosen = [] if asked.write else [f for f in chosen if not asked.stale or age(f)]
     for figure in chosen:
@@ -82,9 +62,8 @@ def main(given: list[str] | None = None) -> int:
             subprocess.run([sys.executable, "-m", "bench.figures", "--only", figure.name], cwd=ROOT, check=True)
     for page in write_blocks():
         print(f"{page} written")
-    return 0
 
 
 if __name__ == "__main__":
     obey_interrupts()
-    sys.exit(main())
+    main()

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import importlib
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
 
-from bench import report
 from bench.figures import pages, store
-from bench.ik import tables as ik
-from bench.plan import constrained, tables as plan
 from bench.pool import ROOT
 
-View = Callable[[Any], str]
 #: What a tick consists of
 TICK = ("wbc/controller", "wbc/stack", "wbc/qp", "wbc/symbolic", "tasks")
 #: What a walk consists of
@@ -30,7 +26,8 @@ class Figure:
         measures: files and folders of the repository whose change makes it old.
         minutes: that it takes on two quiet cores, about.
         command: with a file of its own, which has the stamp under "stamp".
-        views: part -> how it is shown; none: the parts of :func:`bench.figures.store.write`.
+        views: part -> module and function that show it, imported for a page that has it; none: the parts of
+            :func:`bench.figures.store.write`.
     """
 
     name: str
@@ -38,7 +35,7 @@ class Figure:
     minutes: float
     command: tuple[str, ...] = ()
     file: str = ""
-    views: Mapping[str, View] = field(default_factory=lambda: MappingProxyType({}))
+    views: Mapping[str, str] = field(default_factory=lambda: MappingProxyType({}))
 
     @property
     def path(self) -> Path:
@@ -51,33 +48,19 @@ class Figure:
         return " ".join(self.command) if self.command else f"python -m bench.figures --only {self.name}"
 
 
-def _retarget_page(data: Any) -> str:
-    """Imported for its own page only: the bench loads the whole package."""
-    from bench.retarget import page
-
-    return page(data)
-
-
-def _walker_page(data: Any) -> str:
-    """As :func:`_retarget_page`."""
-    from bench.climb.walker import page
-
-    return page(data)
-
-
 _ALL = (
     Figure(
         "bench", (*TICK, "wbc/proximity", "wbc/export", "bench/ours.py"), 15.0, ("make", "bench"),
-        "bench/results.json", {"readme": report.readme, "export": report.export_page},
+        "bench/results.json", {"readme": "bench.report:readme", "export": "bench.report:export_page"},
     ),
     Figure(
         "ik", (*TICK, "wbc/ik", "bench/ik/chains.py", "bench/ik/contenders.py"), 6.0, ("make", "bench-ik"),
-        "bench/ik.json", {"chains": ik.summary},
+        "bench/ik.json", {"chains": "bench.ik.run:summary"},
     ),
     Figure(
         "walk", (*WALK, "bench/climb/walker.py"), 20.0,
         ("python", "-m", "bench.climb.walker", "--output", "bench/data"),
-        "bench/data/walker.json", {"all": _walker_page},
+        "bench/data/walker.json", {"all": "bench.climb.walker:page"},
     ),
     Figure("backends", TICK, 0.5),
     Figure("batch", (*TICK, "wbc/batch"), 1.0),
@@ -86,22 +69,26 @@ _ALL = (
     Figure(
         "plan", ("wbc/plan", "bench/plan"), 60.0,
         ("python", "-m", "bench.plan", "--peers-python", ".venv-plan/bin/python", "--write", "bench/data/plan.json"),
-        "bench/data/plan.json", {"peers": plan.page},
+        "bench/data/plan.json", {"peers": "bench.plan.tables:page"},
     ),
     Figure(
         "plan_constrained", ("wbc/plan", "bench/plan"), 5.0,
         ("python", "-m", "bench.plan", "--constrained", "--seeds", "8", "--write", "bench/data/plan_constrained.json"),
-        "bench/data/plan_constrained.json", {"table": constrained.page},
+        "bench/data/plan_constrained.json", {"table": "bench.plan.constrained:page"},
     ),
     Figure(
         "retarget", (*TICK, "wbc/retarget", "bench/retarget.py", "bench/retarget_peers.py"), 15.0,
         ("python", "-m", "bench.retarget", "--peers-python", ".venv-peers/bin/python", "--json",
          "bench/data/retarget.json"),
-        "bench/data/retarget.json", {"peers": _retarget_page},
+        "bench/data/retarget.json", {"peers": "bench.retarget:page"},
+    ),
+    Figure(
+        "climb_torques", (*WALK, "wbc/simulation", "bench/climb/torques.py"), 90.0,
+        ("python", "-m", "bench.climb", "torques", "--seeds", "20", "--write"),
     ),
     Figure("dynamics", ("wbc/published/newton_euler", "wbc/motion_control"), 3.0),
     Figure("motion_control", (*TICK, "wbc/motion_control", "wbc/published/newton_euler"), 3.0),
-    Figure("first_command", (*TICK, "wbc/native", "wbc/robot"), 3.0, views={"robots": store.joined}),
+    Figure("first_command", (*TICK, "wbc/native", "wbc/robot"), 3.0),
     Figure("fsp", ("wbc/resolvers", "wbc/explore", "wbc/published/ikor"), 4.0),
     Figure("programs", ("examples", "bench/programs"), 0.1),
     Figure("learning", (*TICK, "wbc/batch"), 0.5),
@@ -122,10 +109,16 @@ def render(name: str, part: str) -> str:
     figure = FIGURES[name]
     data = store.read(figure.path) if figure.path.is_file() else {}
     try:
-        text = figure.views[part](data) if figure.views else store.shown(data["parts"][part])
+        text = shown(figure.views[part], data) if figure.views else store.shown(data["parts"][part])
     except KeyError:  # the file, or this part of it, is still to be written
         return f"*Not measured yet: `{figure.told}`.*"
     return f"{text}\n\n{store.signed(data['stamp'], figure.told)}"
+
+
+def shown(view: str, data: store.Data) -> str:
+    """A file as one of :attr:`Figure.views` shows it."""
+    module, name = view.split(":")
+    return str(getattr(importlib.import_module(module), name)(data))
 
 
 def write_blocks() -> list[str]:

@@ -51,16 +51,6 @@ def shown(part: str | Data) -> str:
     return Sheet("", part["columns"], part["rows"]).markdown().split("\n\n", 1)[1]
 
 
-def joined(data: Data) -> str:
-    """All tables of a file as one; their first heads are "WHAT, said of all", and WHAT begins its rows."""
-    tables = list(data["parts"].values())
-    said = tables[0]["columns"][0].partition(", ")[2]
-    rows = [
-        (f"{table['columns'][0].partition(', ')[0]}: {row[0]}", *row[1:]) for table in tables for row in table["rows"]
-    ]
-    return shown({"columns": (said, *tables[0]["columns"][1:]), "rows": rows})
-
-
 def signed(about: Mapping[str, str], command: str) -> str:
     """The line under a block; the command is the usual one where the stamp has none."""
     machine = about["machine"].removesuffix(" before the run")

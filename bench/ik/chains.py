@@ -13,8 +13,8 @@ import numpy as np
 import pinocchio as pin
 
 from bench.descriptions import write_urdf
-from bench.prepare import DESCRIPTIONS
 from bench.problems import Array
+from wbc.robot.sources.files import example_data_folder
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Problem:
 
 def prepare(chain: Chain, folder: Path, count: int, seed: int) -> Problem:
     """Write the URDF and draw the poses: those of joint vectors that are uniform within the limits (+-pi without)."""
-    source, urdf = DESCRIPTIONS / chain.file, folder / f"{chain.name.replace(' ', '_')}.urdf"
+    source, urdf = example_data_folder() / chain.file, folder / f"{chain.name.replace(' ', '_')}.urdf"
     joints = [
         j for j in ET.parse(source).getroot().iter("joint") if j.get("type") in ("revolute", "continuous", "prismatic")
     ]

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from bench.descriptions import mujoco_urdf
 from bench.problems import Array
 from bench.worker_process import begin, serve
 
@@ -80,8 +81,6 @@ def mink_loop(given: dict, budget: float, tolerance: float) -> Solve:
     """``mink.solve_ik`` and ``integrate_inplace`` until the error is small: position limits, gain 1, DAQP."""
     import mink
     import mujoco
-
-    from bench.descriptions import mujoco_urdf
 
     model = mujoco.MjSpec.from_string(mujoco_urdf(Path(given["urdf"]).read_text())).compile()
     slots = [int(model.joint(name).qposadr[0]) for name in given["joints"]]

@@ -20,9 +20,7 @@ def parts() -> dict[str, Sheet | str]:
     """A table with a row a tier."""
     found = {name: _times(wbc.robots.load(name, base="fixed")) for name in ROBOTS}
     rows = [(f"`{tier}`", what, *(us(found[name][tier]) for name in ROBOTS)) for tier, what in TIERS.items()]
-    return {
-        "ticks": Sheet("", ("tier", "what runs", *(f"tick of a {name} [us]" for name in ROBOTS.values())), rows),
-    }
+    return {"ticks": Sheet("", ("tier", "what runs", *(f"tick of a {name} [us]" for name in ROBOTS.values())), rows)}
 
 
 def stack_of(robot: Robot) -> wbc.Stack:

@@ -8,15 +8,14 @@ from time import perf_counter
 
 import numpy as np
 
+from bench.harness import PEERS_PYTHON
 from bench.ours import Ours
-from bench.pool import Worker, cores
+from bench.pool import contest
 from bench.prepare import panda, talos
 from bench.problems import Case, load
 from bench.sheet import Sheet
 from wbc.validation import Array
 
-#: Where the peers are installed, see the Makefile
-PEERS = Path(".venv-peers/bin/python")
 #: Passes of a problem's path that a batch has at once, and how often it is timed
 PASSES, TURNS = {"panda": 50, "talos": 10}, 7
 
@@ -91,8 +90,8 @@ def rate(case: Case, passes: int, threads: int) -> float:
 
 def peer(contender: str, folder: Path, case: Case) -> float:
     """Ticks a second of a peer along the path, targets set in every tick; 0 where it is not installed."""
-    if not PEERS.exists():
+    if not PEERS_PYTHON.exists():
         return 0.0
-    with Worker(str(PEERS.absolute()), contender, folder, cores()[0]) as worker:
-        worker.ask("time", ticks=case.ticks)
-        return 1e9 / float(np.median(worker.ask("time", ticks=case.ticks)["cycle"]))
+    with contest({contender: str(PEERS_PYTHON)}, folder) as workers:
+        workers[contender].ask("time", ticks=case.ticks)
+        return 1e9 / float(np.median(workers[contender].ask("time", ticks=case.ticks)["cycle"]))

@@ -14,12 +14,11 @@ from pathlib import Path
 
 from bench import prepare
 from bench.descriptions import mujoco_urdf
+from bench.harness import PEERS_PYTHON
 from bench.pool import user_environment
 from bench.problems import load
 from bench.sheet import Sheet
 
-#: Where the peers are installed, see the Makefile
-PEERS = Path(".venv-peers/bin/python")
 #: Processes of each kind, in turns
 PROCESSES = 10
 #: Robots, and the frame whose pose is asked for
@@ -94,29 +93,23 @@ _KINDS = {
 }
 
 
-def parts(peers: Path = PEERS, processes: int = PROCESSES) -> dict[str, Sheet | str]:
-    """A table of each: medians of some processes, in turns."""
-    kinds = [kind for kind, (peer, _, _) in _KINDS.items() if peers.exists() or not peer]
+def parts() -> dict[str, Sheet | str]:
+    """Medians of some processes, in turns."""
     with tempfile.TemporaryDirectory(prefix="wbc-first-") as place:
-        found = {name: _robot(name, Path(place), kinds, peers, processes) for name in ROBOTS}
-    what = (
-        "first command: wall [s]", "processor [s]", "changed stack: wall [s]", "processor [s]", "memory [MB]",
-    )  # fmt: skip
-    return {
-        name: Sheet(
-            "",
-            (f"{ROBOTS[name][0]}, medians of {processes} processes", *what),
-            [(kind, *_cells(medians)) for kind, medians in found[name].items()],
-        )
-        for name in ROBOTS
-    }
+        rows = [
+            (f"{shown}: {kind}", *_cells(medians))
+            for name, (shown, _) in ROBOTS.items()
+            for kind, medians in _robot(name, Path(place)).items()
+        ]
+    what = ("first command: wall [s]", "processor [s]", "changed stack: wall [s]", "processor [s]", "memory [MB]")
+    return {"robots": Sheet("", (f"medians of {PROCESSES} processes", *what), rows)}
 
 
 def _cells(medians: list[float]) -> list[str]:
     return [*(f"{seconds:.3f}" for seconds in medians[:4]), f"{medians[4] / 1e6:.0f}"]
 
 
-def _robot(name: str, place: Path, kinds: list[str], peers: Path, processes: int) -> dict[str, list[float]]:
+def _robot(name: str, place: Path) -> dict[str, list[float]]:
     """Kind -> medians of what a row says."""
     folder = getattr(prepare, name)(place / name)
     problem = load(folder).problem
@@ -126,13 +119,13 @@ def _robot(name: str, place: Path, kinds: list[str], peers: Path, processes: int
     arguments += [json.dumps(problem.q0), json.dumps(problem.joints)]
     warm = {"WBC_CACHE": str(place / "warm")}
     _fill(arguments, warm)
+    kinds = {kind: how for kind, how in _KINDS.items() if PEERS_PYTHON.exists() or not how[0]}
     runs: dict[str, list[list[float]]] = {kind: [] for kind in kinds}
-    for _ in range(processes):
-        for kind in kinds:
-            peer, script, cold = _KINDS[kind]
+    for _ in range(PROCESSES):
+        for kind, (peer, script, cold) in kinds.items():
             with tempfile.TemporaryDirectory(dir=place) as empty:
                 cache = {"WBC_CACHE": empty} if cold else warm
-                runs[kind].append(_run(str(peers.absolute()) if peer else sys.executable, script, arguments, cache))
+                runs[kind].append(_run(str(PEERS_PYTHON) if peer else sys.executable, script, arguments, cache))
     return {kind: [statistics.median(column) for column in zip(*runs[kind], strict=True)] for kind in kinds}
 
 

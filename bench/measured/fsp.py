@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-import wbc
 from bench.sheet import Sheet
+from tests.explore.test_explorer import planar, plane_stack
 from wbc.errors import InfeasibleError
 from wbc.explore import Explorer
 from wbc.published.ikor import Driver, Method, Settings, hermies
@@ -61,13 +61,7 @@ def obstacles() -> list[tuple[str, ...]]:
 
 def paths(count: int = 100) -> tuple[int, dict[str, int]]:
     """Random straight paths of a planar arm of three joints with limits of 1.9 rad, whole and step by step."""
-    robot = wbc.robots.from_dh([wbc.robots.DHRow(a=1.0, lower=-1.9, upper=1.9, velocity=1.0) for _ in range(3)])
-    tip = wbc.tasks.Expression(
-        lambda kin, p: kin.position("tip")[:2] - p["target"],
-        units="m",
-        inputs=(wbc.tasks.Input("target", size=2, unit="m", default=np.zeros(2)),),
-    )
-    stack = wbc.Stack(robot, dt=0.01).add(tip, name="tip")
+    stack = plane_stack(planar(1.9))
     explorer = Explorer(stack, np.full(3, 0.3))
     ways: dict[str, dict[str, Any]] = {
         "whole, same start and branch": {},

@@ -1,9 +1,8 @@
-"""What recording costs a loop of a humanoid; as a trial of some ticks: ``python -m bench.measured.recorded 5000``."""
+"""What recording costs a loop of a humanoid."""
 
 from __future__ import annotations
 
 import os
-import sys
 import tempfile
 import time
 from collections.abc import Iterator, Sequence
@@ -11,7 +10,6 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 import numpy as np
-import rich
 
 import wbc
 from bench.sheet import Sheet, us
@@ -100,7 +98,3 @@ def recording(ticks: int) -> Sheet:
         ("file", "", f"{native / 1e6:.0f} MB", f"{copy / 1e6:.0f} MB, {copy / native:.2f} of it"),
     ]
     return Sheet("", (f"{ticks} ticks at 1 kHz, {given} [us]", *WAYS), rows)
-
-
-if __name__ == "__main__":
-    rich.print(recording(int(sys.argv[1])).rich())

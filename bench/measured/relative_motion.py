@@ -12,9 +12,7 @@ ARM = ("4.3", "4.4", "4.5", "4.6", "4.7", "4.8")
 
 def parts() -> dict[str, Sheet | str]:
     """Largest errors of x, y and z in inches."""
-    return {
-        "lines": _lines(),
-    }
+    return {"lines": _lines()}
 
 
 def _lines() -> Sheet:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -33,25 +32,6 @@ SLOW = np.array([0.0, 0.02, 0.004, -0.008, 0.004, 0.006, -0.004])
 DT, SECONDS = 0.02, 25.0
 
 Method = Callable[[np.ndarray, np.ndarray], np.ndarray]
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What a drive did.
-
-    Attributes:
-        microseconds: of one resolution, median. fastest: joint rate [rad/s]. lost: largest difference of the tip's
-            twist from its command [m/s, rad/s]. away: largest difference of a joint from its start after the way
-            back [rad].
-        failed: why it ended early, or empty.
-    """
-
-    name: str
-    microseconds: float
-    fastest: float
-    lost: float
-    away: float
-    failed: str = ""
 
 
 def tip_rates(q: np.ndarray) -> np.ndarray:
@@ -103,8 +83,10 @@ def _pair_method(names: tuple[str, ...]) -> Method:
     return method
 
 
-def drive(name: str, make: Callable[[], Method], seconds: float = SECONDS) -> Outcome:
-    """There and back."""
+def drive(make: Callable[[], Method], seconds: float = SECONDS) -> tuple[str | float, float, float, float]:
+    """There and back: median time of a resolution [us], or why it failed; the fastest joint rate [rad/s]; the largest
+    difference of the tip's twist from its command [m/s, rad/s], and of a joint from its start after the way back [rad].
+    """
     method, q, ticks = make(), START.copy(), round(seconds / DT)
     spent, fastest, lost = [], 0.0, 0.0
     for tick in range(2 * ticks):
@@ -114,29 +96,20 @@ def drive(name: str, make: Callable[[], Method], seconds: float = SECONDS) -> Ou
         try:
             v = method(q, command)
         except WbcError as error:
-            return Outcome(name, np.nan, fastest, lost, np.nan, str(error))
+            return f"failed: {error}", fastest, lost, np.nan
         spent.append(time.perf_counter() - began)
         fastest = max(fastest, float(np.abs(v).max()))
         lost = max(lost, float(np.abs(tip_rates(q)[:6] @ v - command).max()))
         q = q + DT * v
-    return Outcome(name, 1e6 * float(np.median(spent)), fastest, lost, float(np.abs(q - START).max()))
-
-
-COLUMNS = (
-    "method",
-    "one resolution [us]",
-    "fastest joint [rad/s]",
-    "twist lost [m/s, rad/s]",
-    "after the return [rad]",
-)
+    return 1e6 * float(np.median(spent)), fastest, lost, float(np.abs(q - START).max())
 
 
 def parts() -> dict[str, Sheet | str]:
     """A row a method."""
     rows = []
     for name, make in methods().items():
-        found = drive(name, make, SECONDS)
-        first = f"failed: {found.failed}" if found.failed else f"{found.microseconds:.0f}"
-        away = "" if found.failed else f"{found.away:.2g}"
-        rows.append((found.name, first, f"{found.fastest:.3g}", f"{found.lost:.2g}", away))
-    return {"drive": Sheet("", COLUMNS, rows)}
+        took, fastest, lost, away = drive(make)
+        ends = (took, "") if isinstance(took, str) else (f"{took:.0f}", f"{away:.2g}")
+        rows.append((name, ends[0], f"{fastest:.3g}", f"{lost:.2g}", ends[1]))
+    units = ("fastest joint [rad/s]", "twist lost [m/s, rad/s]", "after the return [rad]")
+    return {"drive": Sheet("", ("method", "one resolution [us]", *units), rows)}

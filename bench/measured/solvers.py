@@ -9,11 +9,9 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import tempfile
 import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -31,43 +29,19 @@ def parts() -> dict[str, Sheet | str]:
     """Every solver that takes them on 48 feasible and 40 infeasible problems."""
     columns = ("solver", "solved", "largest error [rad/s]", "infeasible refused", "median us")
     rows = [
-        (f.solver, f"{f.solved} of {f.problems}", f"{f.error[0]:.1e}", f"{f.refused} of {f.infeasible}",
-         f"{f.microseconds:.0f}")
-        for f in survey(available_solvers(experimental=True)) if not f.note
+        (f["solver"], f"{f['solved']} of {f['problems']}", f"{f['error']:.1e}", f"{f['refused']} of {f['infeasible']}",
+         f"{f['microseconds']:.0f}")
+        for f in survey(available_solvers(experimental=True)) if "note" not in f
     ]  # fmt: skip
     return {"survey": Sheet("", columns, rows)}
 
 
-@dataclass(frozen=True)
-class Finding:
-    """What one solver did with the set.
+def measure(name: str, count: int) -> dict[str, Any]:
+    """What one solver does, in this process, with ``count`` problems of every size and weight.
 
-    Attributes:
-        solver: its name.
-        problems: feasible problems given to it.
-        solved: how many it called solved.
-        error: largest and median |x - x*| of those, in rad/s.
-        bound: largest certified bound of those.
-        wrong: how many of those were off by more than 1e-6.
-        refused: infeasible problems that it did not call solved, out of ``infeasible``.
-        microseconds: median time of a call, preparation of equality rows included.
-        note: how the process ended, if not well.
+    Largest |x - x*| [rad/s] and certified bound of those that it calls solved; infeasible problems that it does not
+    call solved; median time of a call, preparation of equality rows included [us].
     """
-
-    solver: str
-    problems: int = 0
-    solved: int = 0
-    error: tuple[float, float] = (0.0, 0.0)
-    bound: float = 0.0
-    wrong: int = 0
-    refused: int = 0
-    infeasible: int = 0
-    microseconds: float = 0.0
-    note: str = ""
-
-
-def measure(name: str, count: int) -> Finding:
-    """Run one solver, in this process, on ``count`` problems of every size and weight."""
     solvers: dict[tuple[int, int], tuple[Backend, Backend]] = {}
     errors, bounds, times = [], [], []
     problems = refused = infeasible = 0
@@ -86,35 +60,26 @@ def measure(name: str, count: int) -> Finding:
         if qp.m:
             infeasible += 1
             refused += not solver.solve(_contradict(qp)).solved
-    return Finding(
-        name,
-        problems,
-        len(errors),
-        (max(errors, default=0.0), float(np.median(errors)) if errors else 0.0),
-        max(bounds, default=0.0),
-        sum(error > 1e-6 for error in errors),
-        refused,
-        infeasible,
-        1e6 * float(np.median(times)),
-    )
+    return {
+        "solver": name, "problems": problems, "solved": len(errors), "error": max(errors, default=0.0),
+        "bound": max(bounds, default=0.0), "refused": refused, "infeasible": infeasible,
+        "microseconds": 1e6 * float(np.median(times)),
+    }  # fmt: skip
 
 
-def survey(names: Sequence[str], count: int = 2, timeout: float = 300.0) -> list[Finding]:
-    """One child process a solver; a crash, a hang and a missing plugin become notes."""
+def survey(names: Sequence[str], count: int = 2, timeout: float = 300.0) -> list[dict[str, Any]]:
+    """:func:`measure` in a child process a solver; a crash, a hang and a missing plugin become a "note"."""
     found = []
     for name in names:
-        with tempfile.TemporaryDirectory() as folder:
-            result = Path(folder) / "finding.json"
-            command = [sys.executable, "-m", "bench.measured.solvers", name, str(result), str(count)]
-            try:
-                child = subprocess.run(command, capture_output=True, timeout=timeout, check=False)
-                end = f"ended with code {child.returncode}"
-            except subprocess.TimeoutExpired:
-                end = f"not done after {timeout:g} s"
-            if result.exists():
-                found.append(Finding(**json.loads(result.read_text())))
-            else:
-                found.append(Finding(name, note=end))
+        command = [sys.executable, "-m", "bench.measured.solvers", name, str(count)]
+        try:
+            child = subprocess.run(command, capture_output=True, text=True, timeout=timeout, check=False)
+            end = f"ended with code {child.returncode}"
+            found.append(
+                {"solver": name, "note": end} if child.returncode else json.loads(child.stdout.splitlines()[-1])
+            )
+        except subprocess.TimeoutExpired:
+            found.append({"solver": name, "note": f"not done after {timeout:g} s"})
     return found
 
 
@@ -125,13 +90,9 @@ def _contradict(qp: QP) -> QP:
     return out
 
 
-def _worker(name: str, result: Path, count: int) -> None:
-    try:
-        finding = measure(name, count)
-    except WbcError as error:
-        finding = Finding(name, note=str(error))
-    result.write_text(json.dumps(asdict(finding)))
-
-
 if __name__ == "__main__":
-    _worker(sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]))
+    try:
+        answered = measure(sys.argv[1], int(sys.argv[2]))
+    except WbcError as error:
+        answered = {"solver": sys.argv[1], "note": str(error)}
+    print(json.dumps(answered))

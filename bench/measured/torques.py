@@ -12,52 +12,38 @@ import numpy as np
 import pinocchio as pin
 
 import wbc
-from bench.descriptions import write_urdf
+from bench.descriptions import write_robot
+from bench.harness import PEERS_PYTHON
 from bench.measured.ticks import median_at
-from bench.prepare import DESCRIPTIONS
 from bench.sheet import Sheet, us
 from wbc.api import Controller, Stack
 from wbc.robot import Robot
 from wbc.tasks import CenterOfMass, EndEffector, JointLimits, Posture, RigidGrasp, SurfaceContact, TorqueLimits
 
-#: Where placo is installed, see the Makefile
-PEERS = Path(".venv-peers/bin/python")
-#: Joints of the Panda that are fixed, as in its table of robots
-FINGERS = ("panda_finger_joint1", "panda_finger_joint2")
 DT, STATES, TICKS, TURNS = 0.002, 64, 600, 5
 FOOT = {"half_lengths": (0.1, 0.06), "friction": 0.6}
 
 
 def parts() -> dict[str, Sheet | str]:
     """Three robots; placo's dynamics solver on two of them."""
-    rows = []
-    arm, states = fixed_arm(), near(wbc.robots.load("panda"), 0.05)
-    target = wbc.robots.load("panda").neutral
-    before = median(arm.compile(wait=True), states, target)
-    rows.append(("Panda, hand and posture: velocities", us(before), ""))
-    arm.add(TorqueLimits())
-    peer = placo("panda_description/urdf/panda.urdf", states, False, ["panda_hand"], False, [])
-    rows.append(
-        (
-            "the same: torques with their limits",
-            us(median(arm.compile(command="torque", wait=True), states, target)),
-            peer,
-        )
-    )
-    grips = two_grips()
-    states = near(grips.robot, 0.001)
-    rows.append(
-        ("three-armed walker, two grips", us(median(grips.compile(command="torque", wait=True), states, None)), "")
-    )
-    stack = humanoid()
+    arm = fixed_arm()
+    states, target = near(arm.robot, 0.05), arm.robot.neutral
+    velocities = median(arm.compile(wait=True), states, target)
+    torques = median(arm.add(TorqueLimits()).compile(command="torque", wait=True), states, target)
+    rows = [
+        ("Panda, hand and posture: velocities", us(velocities), ""),
+        ("the same: torques with their limits", us(torques), placo(arm.robot, states, ["panda_hand"], False, [])),
+    ]
+    grips, stack = two_grips(), humanoid()
+    ticked = median(grips.compile(command="torque", wait=True), near(grips.robot, 0.001), None)
+    rows.append(("three-armed walker, two grips", us(ticked), ""))
     states = near(stack.robot, 0.002)
     contacts = [{"kind": "surface", "frame": f"{side}_sole_link", **FOOT} for side in ("left", "right")]
     contacts.append({"kind": "grasp", "frame": "gripper_right_base_link"})
-    peer = placo("talos_data/robots/talos_reduced.urdf", states, True, [], True, contacts)
-    ours = us(median(stack.compile(command="torque", wait=True), states, None))
-    rows.append(("Talos, two surface contacts and a hand", ours, peer))
-    columns = ("one tick, median [us]", "wbc", "placo")
-    return {"cost": Sheet("", columns, rows)}
+    peer = placo(stack.robot, states, [], True, contacts)
+    ticked = median(stack.compile(command="torque", wait=True), states, None)
+    rows.append(("Talos, two surface contacts and a hand", us(ticked), peer))
+    return {"cost": Sheet("", ("one tick, median [us]", "wbc", "placo"), rows)}
 
 
 def fixed_arm() -> Stack:
@@ -118,29 +104,20 @@ def median(controller: Controller, states: list[np.ndarray], target: np.ndarray 
     return median_at(controller, states, np.zeros(controller.stack.robot.nv), TICKS, TURNS)
 
 
-def placo(
-    description: str, states: list[np.ndarray], floating: bool, frames: list[str], com: bool, contacts: list[object]
-) -> str:
+def placo(robot: Robot, states: list[np.ndarray], frames: list[str], com: bool, contacts: list[object]) -> str:
     """placo's median tick [us] on the same robot, states and contacts; empty where it is not installed."""
-    if not PEERS.exists():
+    if not PEERS_PYTHON.exists():
         return ""
     with tempfile.TemporaryDirectory() as folder:
-        urdf = Path(folder) / "robot.urdf"
-        write_urdf(DESCRIPTIONS / description, urdf, locked=() if floating else FINGERS)
+        urdf, file = Path(folder) / "robot.urdf", Path(folder) / "problem.json"
+        write_robot(robot, urdf)
         problem = {
-            "urdf": str(urdf),
-            "dt": DT,
-            "floating": floating,
-            "states": [q.tolist() for q in states],
-            "frames": frames,
-            "com": com,
-            "contacts": contacts,
-        }
-        file = Path(folder) / "problem.json"
+            "urdf": str(urdf), "dt": DT, "floating": robot.base == "floating", "states": [q.tolist() for q in states],
+            "frames": frames, "com": com, "contacts": contacts,
+        }  # fmt: skip
         file.write_text(json.dumps(problem))
-        done = subprocess.run(
-            [str(PEERS.absolute()), "-m", "bench.torque_peer", str(file)], stdout=subprocess.PIPE, text=True, check=True
-        )
+        command = [PEERS_PYTHON, "-m", "bench.torque_peer", file]
+        done = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True)
     found = json.loads(done.stdout.splitlines()[-1])
     assert found["solved"] > 0.99, found
     return us(found["us"])

@@ -16,16 +16,19 @@ import argparse
 import json
 import os
 import pathlib
-import subprocess
 import time
+from collections.abc import Mapping
+from itertools import product
 from typing import Any
 
 import numpy as np
 
 from bench.figures.store import stamp
+from bench.harness import interpreter
 from bench.plan import constrained, descriptions, judge, problems
 from bench.plan.peers import patiently
-from bench.plan.tables import CONTENDERS, ratios, table
+from bench.plan.tables import CONTENDERS, page
+from bench.pool import Worker, contest
 from wbc.plan import NoPathError
 
 #: Processor time that each planner has [s]
@@ -52,32 +55,7 @@ def solved_here(planner: Any, problem: problems.Problem, seed: int) -> dict[str,
     return answer
 
 
-class Peer:
-    """A process that plans as another package does."""
-
-    def __init__(self, python: str, name: str, core: int) -> None:
-        command = [python, str(pathlib.Path(__file__).with_name("peers.py")), name, str(core)]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
-
-    def solve(self, problem: dict[str, Any]) -> dict[str, Any]:
-        """A path, and the time that it took."""
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._process.stdin.write(json.dumps(problem) + "\n")
-        self._process.stdin.flush()
-        line = self._process.stdout.readline()
-        if not line:
-            raise RuntimeError(f"a peer ended with {self._process.wait()}")
-        return dict(json.loads(line))
-
-    def close(self) -> None:
-        """End it."""
-        assert self._process.stdin is not None
-        self._process.stdin.close()
-        self._process.wait()
-
-
-def row(robot: str, scene: str, seed: int, peers: dict[str, Peer]) -> dict[str, Any]:
+def row(robot: str, scene: str, seed: int, peers: Mapping[str, Worker]) -> dict[str, Any]:
     """All planners on one problem."""
     problem, planner = problems.problem(robot, scene, seed)
     found = {"wbc": solved_here(planner, problem, seed)}
@@ -94,15 +72,14 @@ def row(robot: str, scene: str, seed: int, peers: dict[str, Peer]) -> dict[str, 
             "low": limits[0], "high": limits[1], "start": problem.start.tolist(), "goal": problem.goal.tolist(),
             "seconds": SECONDS,
         }  # fmt: skip
-        found |= {name: peer.solve(given) for name, peer in peers.items()}
-    referee = judge.CoalJudge(problem, planner)
+        found |= {name: peer.ask("plan", **given) for name, peer in peers.items()}
     out: dict[str, Any] = {"robot": robot, "scene": scene, "seed": seed}
     for name, answer in found.items():
         path = answer["path"]
         out[name] = {
             **{key: answer[key] for key in ("seconds", "search", "law") if key in answer},
             "length": None if path is None else judge.length(path),
-            "fault": "" if path is None else referee.fault(path),
+            "fault": "" if path is None else judge.fault(problem, planner, path),
         }
     return out
 
@@ -114,42 +91,30 @@ def main() -> None:
     parser.add_argument("--scenes", default=",".join(problems.SCENES))
     parser.add_argument("--seeds", type=int, default=19)
     parser.add_argument("--first", type=int, default=0, help="seed of the first problem")
-    parser.add_argument("--peers-python", default="")
+    parser.add_argument("--peers-python", type=interpreter)
     parser.add_argument("--core", type=int, default=0)
     parser.add_argument("--constrained", action="store_true")
     parser.add_argument("--join", nargs="+", type=pathlib.Path, default=())
     parser.add_argument("--write", type=pathlib.Path)
     options = parser.parse_args()
     os.sched_setaffinity(0, {options.core})
-    if options.constrained:
-        begun, rows = stamp(), []
-        for kind in constrained.KINDS:
-            for seed in range(options.seeds):
-                rows.append(constrained.row(kind, seed, SECONDS))
-                print(json.dumps(rows[-1]), flush=True)
-        print(f"{constrained.table(rows)}\nload {os.getloadavg()[0]:.2f}")
-        if options.write:
-            options.write.write_text(json.dumps({"stamp": begun, "rows": rows}, indent=1) + "\n")
-        return
-    peers = {n: Peer(options.peers_python, n, options.core) for n in CONTENDERS[1:]} if options.peers_python else {}
     begun, rows = stamp(), [json.loads(line) for file in options.join for line in file.open() if line.startswith("{")]
-    asked = [
-        (r, s, n)
-        for r in options.robots.split(",")
-        for s in options.scenes.split(",")
-        for n in range(options.first, options.seeds)
-    ]
-    try:
-        for robot, scene, seed in () if rows else asked:
-            rows.append(row(robot, scene, seed, peers))
-            print(json.dumps(rows[-1]), flush=True)
-    finally:
-        for peer in peers.values():
-            peer.close()
-    compared = tuple(name for name in CONTENDERS[1:] if name in rows[0])
-    print(table(rows, ("wbc", *compared)))
-    if compared:
-        print(ratios(rows, compared))
+
+    def measured(row: dict[str, Any]) -> None:
+        rows.append(row)
+        print(json.dumps(row), flush=True)
+
+    if options.constrained:
+        for kind, seed in product(constrained.KINDS, range(options.seeds)):
+            measured(constrained.row(kind, seed, SECONDS))
+        print(constrained.table(rows))
+    else:
+        who = dict.fromkeys(CONTENDERS[1:] if options.peers_python else (), options.peers_python)
+        chosen = options.robots.split(","), options.scenes.split(","), range(options.first, options.seeds)
+        with contest(who, pathlib.Path(), "bench.plan.peers") as peers:
+            for robot, scene, seed in () if rows else product(*chosen):
+                measured(row(robot, scene, seed, peers))
+        print(page({"rows": rows}))
     print(f"load {os.getloadavg()[0]:.2f}")
     if options.write:
         options.write.write_text(json.dumps({"stamp": begun, "rows": rows}, indent=1) + "\n")

@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 import wbc
+from tests.plan.scenes import base_with_a_body, mechanism, standing_g1, tray
 from wbc.errors import WbcError
 from wbc.plan import MotionPlanner
 from wbc.shapes import Box
@@ -76,21 +77,14 @@ def _cup(name: str, rng: np.random.Generator) -> tuple[MotionPlanner, Any, Any]:
     raise RuntimeError("no free start")
 
 
-def _tray(name: str, rng: np.random.Generator) -> tuple[MotionPlanner, Any, Any]:
-    robot = wbc.robots.load(name, base="fixed", lock=["?_gripper_*", "laser_*", "torso_*", "head_*"], shapes="none")
-    hands = robot.frames["left_hand"], robot.frames["right_hand"]
-    stack = wbc.Stack(robot, dt=0.01)
-    stack.add(wbc.tasks.RelativePose(*hands), name="tray")
-    stack.add(wbc.tasks.EndEffector(hands[0], kind="position"), name="left")
-    stack.add(wbc.tasks.JointLimits())
-    planner = stack.planner(keep=("tray",))
+def _tray(_: str, rng: np.random.Generator) -> tuple[MotionPlanner, Any, Any]:
+    planner, hands = tray()
+    robot = planner.stack.robot
     place = robot.pose(robot.neutral, hands[0]).translation
     return planner, robot.neutral, _free(planner, robot.neutral, "left", place, np.array([0.15, 0.15, 0.2]), rng)
 
 
 def _base(name: str, rng: np.random.Generator) -> tuple[MotionPlanner, Any, Any]:
-    from tests.plan.scenes import base_with_a_body
-
     robot = base_with_a_body(name)
     frame = robot.frames["base"]
     stack = wbc.Stack(robot, dt=0.01)
@@ -104,21 +98,11 @@ def _base(name: str, rng: np.random.Generator) -> tuple[MotionPlanner, Any, Any]
 
 
 def _loop(name: str, rng: np.random.Generator) -> tuple[MotionPlanner, Any, Any]:
-    from tests.loops.mechanisms import NAMED
-
-    robot = wbc.robots.load(NAMED[name])
-    stack = wbc.Stack(robot, dt=0.01)
-    stack.add(wbc.tasks.JointLimits())
-    start = goal = robot.closed(robot.neutral)
-    way = rng.normal(size=robot.nv)
-    for _ in range(15):
-        goal = robot.closed(robot.integrate(goal, 0.05 * np.sqrt(robot.nv) * way / np.linalg.norm(way)))
+    stack, start, goal = mechanism(name, rng)
     return stack.planner(), start, goal
 
 
 def _feet(_: str, rng: np.random.Generator) -> tuple[MotionPlanner, Any, Any]:
-    from tests.plan.scenes import standing_g1
-
     stack, q, (over, under) = standing_g1(int(rng.integers(10**6)))
     planner = stack.planner()
     return planner, planner.coordinates.configuration(planner.branches(q, {"hand": over})[0]), {"hand": under}

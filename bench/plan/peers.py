@@ -1,11 +1,7 @@
-"""A process in the peers' environment: a problem a line in, a path a line out. Imports nothing of this package.
-
-python peers.py ompl|roboplan [core]
-"""
+"""A process in the peers' environment, see :class:`bench.pool.Worker`: a problem a line in, a path a line out."""
 
 from __future__ import annotations
 
-import json
 import os
 import sys
 import tempfile
@@ -14,6 +10,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+
+from bench.worker_process import begin, serve
 
 #: (seed, seconds) -> (points of a path, None: none; processor time of the search alone [s])
 Plan = Callable[[int, float], tuple[list[list[float]] | None, float]]
@@ -136,21 +134,20 @@ MAKERS = {"ompl": ompl_of, "roboplan": roboplan_of}
 
 def main() -> None:
     """See the module."""
-    if len(sys.argv) > 2:
-        os.sched_setaffinity(0, {int(sys.argv[2])})
-    answers = os.fdopen(os.dup(1), "w")
+    name, _, *core = sys.argv[1:]
+    begin(core)
     # What is printed besides says nothing to anybody
-    for number in (1, 2):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), number)
-    if sys.argv[1] == "ompl":
+    os.dup2(os.open(os.devnull, os.O_WRONLY), 2)
+    if name == "ompl":
         from ompl import util
 
         # Once a process: later seeds count for nothing
         util.RNG.setSeed(1)
-    for line in sys.stdin:
-        problem = json.loads(line)
-        answer = patiently(MAKERS[sys.argv[1]](problem), problem["seed"], problem["seconds"])
-        print(json.dumps(answer), file=answers, flush=True)
+
+    def answer(problem: dict[str, Any]) -> dict[str, Any]:
+        return patiently(MAKERS[name](problem), problem["seed"], problem["seconds"])
+
+    serve(answer, {"ready": name})
 
 
 if __name__ == "__main__":

@@ -66,5 +66,5 @@ def page(data: Any) -> str:
     """Table and ratios of a file that ``python -m bench.plan --write`` wrote."""
     rows = data["rows"]
     peers = tuple(name for name in CONTENDERS[1:] if name in rows[0])
-    lines = "\n".join(f"* {line}" for line in ratios(rows, peers).splitlines())
+    lines = "\n".join(f"* {line}" for line in ratios(rows, peers).splitlines() if peers)
     return f"{table(rows, ('wbc', *peers))}\n\n{lines}"

@@ -1,22 +1,16 @@
-"""The ten programs of examples/ as they are written with pink or mink: their lengths and what they print."""
+"""The ten programs of examples/ as they are written with pink or mink: their lengths, and how the peers' are called."""
 
 from __future__ import annotations
 
 import ast
-import subprocess
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-import pinocchio as pin
-
 import wbc
-from bench.descriptions import write_urdf
+from bench.descriptions import write_robot, write_urdf
 from bench.pool import ROOT
-from bench.sheet import Sheet
 
 HERE, EXAMPLES = Path(__file__).parent, ROOT / "examples"
-COLUMNS = ("program", "lines here", "lines there", "with", "it says here", "it says there")
 
 
 @dataclass(frozen=True)
@@ -78,41 +72,14 @@ def arguments(program: Program, folder: Path) -> list[str]:
         return [str(EXAMPLES / program.robot)]
     robot, file = wbc.robots.load(program.robot, shapes="none"), folder / f"{program.robot}.urdf"
     folder.mkdir(parents=True, exist_ok=True)
-    # What the table locks has no joint for the peer either; bases of wheels it builds itself
-    whole = pin.buildModelFromUrdf(robot.source)
-    locked = set(list(whole.names)[1:]) - set(robot.joint_names) if robot.base == "fixed" else ()
-    write_urdf(Path(robot.source), file, locked=locked)
+    if robot.base == "fixed":
+        write_robot(robot, file)
+        return [str(file)]
+    # Bases of wheels are built by the peer itself
+    write_urdf(Path(robot.source), file)
     words = [str(file)]
-    if robot.base != "fixed":
-        for j in range(2, robot.model.njoints):
-            value = float(robot.neutral[robot.model.idx_qs[j]])
-            if int(robot.model.nqs[j]) == 1 and value != 0.0:
-                words += [str(robot.model.names[j]), f"{value:.6g}"]
+    for j in range(2, robot.model.njoints):
+        value = float(robot.neutral[robot.model.idx_qs[j]])
+        if int(robot.model.nqs[j]) == 1 and value != 0.0:
+            words += [str(robot.model.names[j]), f"{value:.6g}"]
     return words
-
-
-def said(command: list[str]) -> str:
-    """The last line that a program prints, of its errors where it fails."""
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600, cwd=ROOT)
-    if done.returncode:
-        last = (done.stdout.strip().splitlines() or [""])[-1], (done.stderr.strip().splitlines() or ["fails"])[-1]
-        return f"{last[0]}; fails: {last[1]}"
-    return done.stdout.strip().splitlines()[-1]
-
-
-def lengths() -> Sheet:
-    """Lines of each program, here and there."""
-    rows = [(p.about, str(length(p.ours)), str(length(p.theirs)), p.peer) for p in PROGRAMS]
-    return Sheet("Programs", COLUMNS[:4], rows)
-
-
-def results(python: str, folder: Path) -> Sheet:
-    """The same, with what each program says at its end; both are run."""
-    rows = []
-    for program, row in zip(PROGRAMS, lengths().rows, strict=True):
-        if program.display:
-            rows.append((*row, "runs in a browser", "needs a display"))
-            continue
-        ours = said([sys.executable, str(program.ours)])
-        rows.append((*row, ours, said([python, str(program.theirs), *arguments(program, folder)])))
-    return Sheet("Programs", COLUMNS, rows)

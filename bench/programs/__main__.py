@@ -1,16 +1,20 @@
-"""``python -m bench.programs``: lengths of the ten programs side by side; ``--peers-python PYTHON`` runs both."""
+"""``python -m bench.programs PYTHON``: run the ten programs, here and as the peers have them.
+
+PYTHON is an interpreter with pink and mink, such as .venv-peers/bin/python; what each prints follows its name.
+"""
 
 from __future__ import annotations
 
-import argparse
+import subprocess
+import sys
 from pathlib import Path
 
-from rich.console import Console
+from bench.pool import ROOT
+from bench.programs import PROGRAMS, arguments
 
-from bench.programs import lengths, results
-
-parser = argparse.ArgumentParser(description=__doc__)
-parser.add_argument("--peers-python", default="", help="Python with pink and mink, such as .venv-peers/bin/python.")
-given = parser.parse_args().peers_python
-sheet = results(given, Path("build/programs")) if given else lengths()
-Console(width=None if given else 100).print(sheet.rich())
+for program in PROGRAMS:
+    if not program.display:
+        theirs = [sys.argv[1], program.theirs, *arguments(program, Path("build/programs"))]
+        for command in ([sys.executable, program.ours], theirs):
+            print(f"{Path(command[1]).relative_to(ROOT)}:", flush=True)
+            subprocess.run(command, check=False)

@@ -44,13 +44,14 @@ class Problem:
     def theirs(self, points: int | None, **how: Any) -> tuple[Any, Any, Any]:
         """toppra's trajectory or None, its instance, its path."""
         path = self.spline()
-        asked = [raw.velocity_limits(self.velocity), raw.acceleration_limits(self.acceleration)]
-        return *raw.solve(asked, path, points, **how), path
+        return *raw.solve(raw.rate_limits(self.velocity, self.acceleration), path, points, **how), path
 
     def law(self, trajectory: Any, instance: Any, path: Any) -> Law | None:
-        """toppra's trajectory as a law."""
+        """toppra's trajectory as a law; None where there is none, or one without end."""
+        if trajectory is None or not (np.isfinite(trajectory.duration) and trajectory.duration > 0.0):
+            return None
         limits = MotionLimits(velocity=self.velocity, acceleration=self.acceleration)
-        return None if trajectory is None else raw.law_of(trajectory, instance, path, limits)
+        return raw.law_of(trajectory, instance, path, limits)
 
     def ours(self) -> Law:
         """A law along the same spline, with what a user reads of it."""
@@ -59,26 +60,26 @@ class Problem:
         return law
 
 
-def random_set(rng: np.random.Generator, count: int, repeats: int) -> Iterator[Record]:
+def random_set(rng: np.random.Generator, count: int) -> Iterator[Record]:
     """Raw toppra with its defaults, raw toppra at its best, and ours along the same splines."""
     for number in (5, 10):
         for _ in range(count):
             problem = Problem(*random_problem(rng, number))
             record: Record = {"waypoints": number}
             for name, points, how in (("default", None, raw.DEFAULT), ("constant", 1001, raw.CONSTANT)):
-                spent, made = timed(partial(problem.theirs, points, **how), repeats)
+                spent, made = timed(partial(problem.theirs, points, **how))
                 record[name] = {"ms": spent, **judged(problem.law(*made))}
-            spent, law = timed(problem.ours, repeats)
+            spent, law = timed(problem.ours)
             record["ours"] = {"ms": spent, **judged(law)}
             reference = problem.theirs(REFERENCE, **raw.CONSTANT)[0]
             record["reference"] = None if reference is None else float(reference.duration)
             yield record
 
 
-def timed(make: Callable[[], Any], repeats: int) -> tuple[float, Any]:
-    """(least of the wall times [ms], what was made)."""
+def timed(make: Callable[[], Any]) -> tuple[float, Any]:
+    """(least of two wall times [ms], what was made)."""
     spent = []
-    for _ in range(repeats):
+    for _ in range(2):
         begin = time.perf_counter()
         made = make()
         spent.append(1e3 * (time.perf_counter() - begin))
@@ -101,26 +102,12 @@ def small_moves(rng: np.random.Generator, count: int) -> Iterator[Record]:
             way = rng.standard_normal(6)
             start = rng.uniform(-1.0, 1.0, 6)
             waypoints = np.stack([start, start + 10.0**-exponent * way / np.linalg.norm(way)])
-            velocity, acceleration = rng.uniform(1.0, 3.0, 6), rng.uniform(2.0, 10.0, 6)
-            record = {"exponent": exponent}
-            record |= compared(waypoints, velocity, acceleration, 101)
-            yield record
-
-
-def compared(waypoints: Array, velocity: Array, acceleration: Array, points: int) -> Record:
-    """Raw toppra (waypoints evenly over s in [0, 1]) and ours on one problem, refusals as None."""
-    path = raw.spline(np.linspace(0.0, 1.0, len(waypoints)), waypoints)
-    constraints = [raw.velocity_limits(velocity), raw.acceleration_limits(acceleration)]
-    found, _ = raw.solve(constraints, path, points)
-    theirs: Record = {"duration": None, "ratio": None}
-    if found is not None and np.isfinite(found.duration) and found.duration > 0.0:
-        limits = MotionLimits(velocity=velocity, acceleration=acceleration)
-        theirs = judged(raw.law_of(found, None, path, limits))
-    try:
-        law = time_optimal(spline_path(waypoints), velocity, acceleration, intervals=points - 1)
-    except WbcError:
-        return {"raw": theirs, "ours": judged(None)}
-    return {"raw": theirs, "ours": judged(law)}
+            problem = Problem(waypoints, rng.uniform(1.0, 3.0, 6), rng.uniform(2.0, 10.0, 6))
+            try:
+                law = time_optimal(spline_path(waypoints), problem.velocity, problem.acceleration, intervals=100)
+            except WbcError:
+                law = None
+            yield {"exponent": exponent, "raw": judged(problem.law(*problem.theirs(101))), "ours": judged(law)}
 
 
 def torques(rng: np.random.Generator, count: int) -> Iterator[Record]:
@@ -142,13 +129,12 @@ def torques(rng: np.random.Generator, count: int) -> Iterator[Record]:
             ("collocation", "Collocation", 201, raw.CONSTANT),
             ("interpolation", "Interpolation", 201, raw.CONSTANT),
         ):
-            asked = [raw.velocity_limits(velocity), raw.torque_limits(dynamics, effort, scheme)]
-            spent, (found, instance) = timed(partial(raw.solve, asked, path, points, **how), 1)
-            law = (
-                None if found is None else raw.law_of(found, instance, path, MotionLimits(velocity=velocity), (check,))
-            )
+            asked = [*raw.rate_limits(velocity), raw.torque_limits(dynamics, effort, scheme)]
+            spent, (found, instance) = timed(partial(raw.solve, asked, path, points, **how))
+            limits = MotionLimits(velocity=velocity)
+            law = None if found is None else raw.law_of(found, instance, path, limits, (check,))
             record[name] = {"ms": spent, **_torque(law)}
-        spent, law = timed(partial(time_optimal, raw.polynomial(path), velocity, torque=effort, robot=robot), 1)
+        spent, law = timed(partial(time_optimal, raw.polynomial(path), velocity, torque=effort, robot=robot))
         record["ours"] = {"ms": spent, **_torque(law)}
         yield record
 

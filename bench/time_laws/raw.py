@@ -43,14 +43,10 @@ def polynomial(path: Any) -> PolynomialPath:
     return PolynomialPath([start, end], [path([start], 1), path([start], 0)])
 
 
-def velocity_limits(velocity: Any) -> Any:
-    """toppra's constraint."""
-    return constraint.JointVelocityConstraint(both(velocity))
-
-
-def acceleration_limits(acceleration: Any) -> Any:
-    """toppra's constraint, with its default scheme, Interpolation."""
-    return constraint.JointAccelerationConstraint(both(acceleration))
+def rate_limits(velocity: Any, acceleration: Any = None) -> list[Any]:
+    """toppra's constraints, that of accelerations with its default scheme, Interpolation."""
+    asked = [constraint.JointVelocityConstraint(both(velocity))]
+    return asked if acceleration is None else [*asked, constraint.JointAccelerationConstraint(both(acceleration))]
 
 
 def torque_limits(dynamics: Any, torque: Array, scheme: str | None = None) -> Any:

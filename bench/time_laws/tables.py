@@ -119,24 +119,12 @@ def torques(records: list[Record]) -> Sheet:
 def states(records: list[Record]) -> Sheet:
     """Random states and those near rest."""
     rows = []
-    for family in FAMILIES:
-        some = [r for r in records if r["family"] == family]
-        if not some:
-            continue
-        total = sum(r["states"] for r in some)
-        raw = sum(r["raw"] for r in some)
-        rows.append((
-            family, f"{total}", f"{raw} ({_percent(raw / total)})", f"{sum(r['ours'] for r in some)}",
-            f"{max(r['excess'] for r in some):.1e}", f"{max(r['off'] for r in some):.1e}",
-        ))  # fmt: skip
-    columns = (
-        "3 joints, synchronised in time",
-        "states",
-        "ruckig raises",
-        "wbc raises",
-        "excess of limits",
-        "error of states",
-    )
+    for family, some in grouped(sorted(records, key=lambda r: FAMILIES.index(r["family"])), "family").items():
+        total, raw, ours = (sum(r[key] for r in some) for key in ("states", "raw", "ours"))
+        worst = (f"{max(r[key] for r in some):.1e}" for key in ("excess", "off"))
+        rows.append((family, f"{total}", f"{raw} ({_percent(raw / total)})", f"{ours}", *worst))
+    titles = ("states", "ruckig raises", "wbc raises", "excess of limits", "error of states")
+    columns = ("3 joints, synchronised in time", *titles)
     return Sheet("From state to state", columns, rows)
 
 

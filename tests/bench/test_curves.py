@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ from bench.ours import Ours
 from bench.problems import Case, load
 from bench.reference import Referee
 from bench.scenery import boxes_around, capsules, distances, link_boxes, spheres_around
-from tests.bench.test_problems import worst_error
+from tests.bench.independent import stated, worst_error
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +25,7 @@ def cluttered(tmp_path_factory: pytest.TempPathFactory) -> Case:
     panda, folder = curves.by_name("panda"), tmp_path_factory.mktemp("bench") / "spheres"
     arm = capsules(panda)
     balls = spheres_around(panda, arm, curves.joint_path(panda), 3)
-    curves.write(folder, "spheres", panda, ["panda_hand"], solids=arm + balls, against_fixed=True)
+    curves.among(folder, "spheres", panda, arm + balls)
     return load(folder)
 
 
@@ -34,7 +35,7 @@ def boxed(tmp_path_factory: pytest.TempPathFactory) -> Case:
     panda, folder = curves.by_name("panda"), tmp_path_factory.mktemp("bench") / "boxes"
     own = link_boxes(panda)
     crates = boxes_around(panda, own, curves.joint_path(panda), 2)
-    curves.write(folder, "boxes", panda, ["panda_hand"], solids=own + crates, against_fixed=True, sensed=10)
+    curves.among(folder, "boxes", panda, own + crates, 10)
     return load(folder)
 
 
@@ -67,8 +68,8 @@ def test_answers_are_those_of_an_independent_build_of_the_qp(
     name: str, largest: float, request: pytest.FixtureRequest
 ) -> None:
     # The damping at the border of the workspace, which the QP of the problem does not have, is switched off
-    ours = Ours(request.getfixturevalue(name), calm=False)
-    assert worst_error(ours, ours.independent_error) < largest
+    case = request.getfixturevalue(name)
+    assert worst_error(Ours(case, calm=False), functools.partial(stated, Referee(case))) < largest
 
 
 def test_samples_stop_at_the_budget(cluttered: Case) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from bench import prepare
-from bench.deadlines import course, run, worker
+from bench.deadlines import course, run
 from bench.deadlines.course import Course
 from bench.problems import load
 from wbc.controller import core_of
@@ -28,7 +28,6 @@ def short(tmp_path_factory: pytest.TempPathFactory) -> Course:
 
 @pytest.fixture(autouse=True)
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(worker, "TICKS", TICKS)
     monkeypatch.setattr(run, "TICKS", TICKS)
 
 
@@ -39,7 +38,7 @@ def test_targets_jump_and_balls_move(short: Course) -> None:
 
 
 def test_a_cap_is_kept_and_walks_repeat(short: Course) -> None:
-    free, one, again = (worker.walk(short, cap) for cap in (None, 1, None))
+    free, one, again = (run.walk(short, cap) for cap in (None, 1, None))
     assert free == again
     assert max(free["iterations"]) > 3
     assert "capped" not in free["statuses"]
@@ -53,8 +52,8 @@ def test_what_is_timed_is_the_same_loop(short: Course, monkeypatch: pytest.Monke
     seen: list[np.ndarray] = []
     step = short.place
     monkeypatch.setattr(short, "place", lambda q, frame: seen.append(q) or step(q, frame))
-    worker.walk(short, 2)
-    spent = worker.durations(short, 2)
+    run.walk(short, 2)
+    spent = run.durations(short, 2)
     assert len(spent) == TICKS
     assert min(spent) > 0
     c = short.controller

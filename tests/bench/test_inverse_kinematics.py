@@ -9,9 +9,9 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from bench.ik import tables
 from bench.ik.__main__ import main
 from bench.ik.chains import CHAINS, Judge, configuration, prepare
+from bench.ik.run import summary
 
 
 def test_every_chain_is_an_arm_and_its_poses_can_be_reached(tmp_path: Path) -> None:
@@ -38,18 +38,13 @@ def test_the_judge_refuses_joints_outside_their_limits(tmp_path: Path) -> None:
     assert not judge.accepts(q, pose, 1e-5)
 
 
-def options(folder: Path) -> list[str]:
-    places = ["--work", str(folder / "work"), "--output", str(folder)]
-    return ["--count", "30", "--chains", "Panda", "--budget", "0.5", *places]
-
-
 def test_a_small_run_writes_its_table(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    main(options(tmp_path))
+    main(["--count", "30", "--chains", "Panda", "--budget", "0.5", "--output", str(tmp_path)])
     assert "pink and mink are left out" in capsys.readouterr().out
     results = json.loads((tmp_path / "ik.json").read_text())
     (row,), (batch,) = results["rows"], results["batches"]
     assert (row["rate"], row["published"], row["poses"], results["interrupted"]) == (100.0, 99.88, 30, None)
     assert (batch["rate"], batch["poses"]) == (100.0, 30)
-    head, _, cells = tables.summary(results).splitlines()[:3]
+    head, _, cells = summary(results).splitlines()[:3]
     assert head.startswith("| chain | joints | solved [%] | TRAC-IK published [%] |")
     assert cells.startswith("| Panda | 7 | 100.00 | 99.88 |")

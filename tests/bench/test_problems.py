@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import functools
 from math import inf
 from pathlib import Path
 
@@ -12,26 +12,14 @@ import pytest
 
 import wbc
 from bench import prepare, worker
-from bench.contender import exact_solution
 from bench.ours import Ours
 from bench.problems import Case, load
 from bench.reference import Referee
+from tests.bench.independent import clearances, stated, worst_error
+from tests.judges.quadprog_qp import referee as by_quadprog
 from tests.repeats import ALL, MORE
 
 MAKERS = {"panda": prepare.panda, "talos": prepare.talos} | ({"ur5": prepare.ur5} if MORE >= ALL else {})
-
-
-def worst_error(ours: Ours, measure: Callable[[], float]) -> float:
-    """Largest error of the answer along the path, every tenth tick [rad/s, m/s]."""
-    ours.reset()
-    errors = []
-    for k in range(ours.case.ticks):
-        ours.aim(k)
-        if k % 10 == 0:
-            errors.append(measure())
-        ours.call()
-        ours.settle()
-    return max(errors)
 
 
 @pytest.fixture(scope="module", params=MAKERS)
@@ -68,20 +56,20 @@ def test_shared_description_is_the_robot(case: Case) -> None:
 
 def test_paths_make_limits_bind_and_come_to_rest(case: Case) -> None:
     referee = Referee(case)
-    first = referee.velocity(case.q0, 0)
-    speed = referee.model.upperVelocityLimit[referee.first_joint :]
-    assert np.any(np.abs(first[referee.first_joint :]) > speed * (1 - 1e-9))
+    qp = stated(referee, case.q0, 0)
+    first, speed = by_quadprog(qp), referee.model.upperVelocityLimit
+    assert first is not None
+    assert np.any(np.abs(first) > speed * (1 - 1e-9))
     np.testing.assert_array_equal(case.poses[-1], case.poses[-prepare.REST])
 
 
 def test_answers_are_exact_solutions_of_the_qp_that_was_built(ours: Ours) -> None:
-    assert worst_error(ours, ours.reference_error) < 1e-6
+    assert worst_error(ours) < 1e-6
 
 
 def test_answers_are_those_of_an_independent_build_of_the_qp(case: Case) -> None:
     # What `calm` adds to the QP is not in the problem
-    ours = Ours(case, calm=False)
-    assert worst_error(ours, ours.independent_error) < 1e-6
+    assert worst_error(Ours(case, calm=False), functools.partial(stated, Referee(case))) < 1e-6
 
 
 def test_path_is_followed_clear_of_obstacles(ours: Ours) -> None:
@@ -94,7 +82,7 @@ def test_path_is_followed_clear_of_obstacles(ours: Ours) -> None:
         least = []
         for state in states:
             referee.update(np.array(state))
-            least.append(referee.clearances()[0].min())
+            least.append(clearances(referee)[0].min())
         # The margin is kept, and reached: the obstacles are in the way
         assert min(least) > case.problem.margin - 1e-5
         assert min(least) < case.problem.margin + 1e-3
@@ -104,22 +92,6 @@ def test_workers_time_every_tick(ours: Ours) -> None:
     times = worker.time_calls(ours, 20)
     assert {"call", "cycle"} <= set(times)
     assert all(len(values) == 20 and min(values) > 0 for values in times.values())
-
-
-@pytest.mark.parametrize("seed", range(10))
-def test_exact_solution_satisfies_the_optimality_conditions(seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    n, m = 6, 8
-    root = rng.normal(size=(n, n))
-    hessian, linear = root @ root.T + 0.1 * np.eye(n), rng.normal(size=n)
-    rows, upper = rng.normal(size=(m, n)), np.append(rng.uniform(0.0, 0.3, size=m - 1), np.inf)
-    x = exact_solution(hessian, linear, rows, upper)
-    slack = upper - rows @ x
-    assert slack.min() > -1e-10
-    active = slack < 1e-10
-    multipliers = np.linalg.lstsq(rows[active].T, -(hessian @ x + linear), rcond=None)[0]
-    np.testing.assert_allclose(rows[active].T @ multipliers, -(hessian @ x + linear), atol=1e-10)
-    assert np.all(multipliers >= -1e-10)
 
 
 def test_problem_folder_is_complete(case: Case) -> None:

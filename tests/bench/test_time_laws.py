@@ -25,7 +25,7 @@ def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, dict[str, An
     folder = tmp_path_factory.mktemp("laws")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(least_time, "REFERENCE", 1601)
-        run.main(["--problems", "1", "--count", "16", "--processes", "1", "--seed", "3", "--output", str(folder)])
+        run.main(["--share", "0.001", "--processes", "1", "--seed", "3", "--output", str(folder)])
     return (folder / "time_laws.md").read_text(), json.loads((folder / "time_laws.json").read_text())
 
 

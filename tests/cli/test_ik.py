@@ -53,6 +53,34 @@ def test_all_branches_of_a_pose(tmp_path: Path) -> None:
     assert min(np.abs(a - b).max() for k, a in enumerate(found) for b in found[:k]) > 0.01
 
 
+#: Joints that turn without end on both sides of a slide
+CHAIN = """<robot name="chain"><link name="a"/><link name="b"/><link name="c"/><link name="d"/><link name="tool"/>
+<joint name="turn" type="continuous"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/></joint>
+<joint name="slide" type="prismatic"><parent link="b"/><child link="c"/><origin xyz="0.4 0 0"/><axis xyz="1 0 0"/>
+<limit lower="0" upper="0.3" effort="1" velocity="1"/></joint>
+<joint name="wrist" type="continuous"><parent link="c"/><child link="d"/><axis xyz="0 0 1"/></joint>
+<joint name="end" type="fixed"><parent link="d"/><child link="tool"/><origin xyz="0.1 0 0"/></joint></robot>"""
+
+
+def test_the_end_of_a_chain_is_its_tip_and_angles_without_end_are_printed(tmp_path: Path) -> None:
+    file = tmp_path / "chain.urdf"
+    file.write_text(CHAIN)
+    code, out, err = run(file, "--target", "0,0.6,0,0,0,1,0", "--backend", "vm")
+    assert (code, err) == (0, "")
+    robot, q = wbc.robots.load(str(file)), np.array(printed(out, "1"))
+    assert robot.pose(q, "tool").isApprox(pin.SE3(np.diag([-1.0, -1.0, 1.0]), np.array([0.0, 0.6, 0.0])), 1e-4)
+    values = {
+        line.split()[0]: float(line.split()[2]) for line in out.splitlines() if line.split()[1:2] in (["rad"], ["m"])
+    }
+    turned = (
+        pin.rpy.matrixToRpy(robot.pose(q, "b").rotation)[2],
+        pin.rpy.matrixToRpy(robot.pose(q, "d", "c").rotation)[2],
+    )
+    np.testing.assert_allclose(
+        [values["turn"], values["slide"], values["wrist"]], [turned[0], q[2], turned[1]], atol=1e-5
+    )
+
+
 def test_targets_from_files_and_positions(tmp_path: Path) -> None:
     text = tmp_path / "way.csv"
     text.write_text("# two poses\nt,x,y,z,qx,qy,qz,qw\n0,0.4,0.2,0.5,1,0,0,0\n\n1,0.4,-0.2,0.5,1,0,0.0002,0\n")

@@ -29,6 +29,7 @@ USUAL = {
 }  # fmt: skip
 REFUSED: list[tuple[list[str], str]] = [
     (["robots", "show", "pandda"], "robot: unknown name, did you mean 'panda'?"),
+    (["ik", "none.urd", "--target", "0.4,0.2,0.5"], "robot: there is no such file"),
     (["track", "pandda"], "robot: unknown name, did you mean 'panda'?"),
     (["track", "--path", "circel"], "path: unknown name, did you mean 'circle'?"),
     (["track", "--path", "none.csv"], "path: there is no such file"),
@@ -132,7 +133,7 @@ REFUSED: list[tuple[list[str], str]] = [
     (["ik", "ur5", "--target", "0.4,0.2,0.5,1,0,0,0", "--sphere", "1,0,0,0.1,1,0,0"], "leave the velocity out"),
     (["ik", "ur5", "--target", "0.4,0.2,0.5,1,0,0,0", "--start", "1,2"], "start: expected shape (6,)"),
     (["ik", "ur5", "--target", "0.4,0.2,0.5,1,0,0,0", "--backend", "nativ"], "did you mean 'native'"),
-    (["ik", "ur5", "--target", "0.4,0.2,0.5,1,0,0,0", "--out", "q.txt"], "out: unknown name"),
+    (["ik", "ur5", "--target", "0.4,0.2,0.5,1,0,0,0", "--out", "q.txt"], "out: how its name ends says"),
     (["ik", "ur5", "--target", "0.4,0.2,0.5,1,0,0,0", "--out", "none/q.csv"], "there is no such folder"),
     (["ik", "ur5", "--target", "0.4,0.2,0.5,1,0,0,0", "--out", "there.csv"], "use --force"),
     (["ik", "ur5", "--targets", "none.csv"], "there is no such file"),

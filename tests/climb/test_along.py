@@ -148,6 +148,7 @@ def test_a_search_that_lacks_memory_says_so() -> None:
             count -= 8
             try:
                 plan_along(walker, scene, track)
+                break
             except MemoryError as error:
                 print("lacks memory for", error)
     """

@@ -123,7 +123,7 @@ def walk(gravity: float) -> ContactPlan:
     """The published walker goes on along its cylinder, gravity towards the holds."""
     options = ClimbOptions.by_torques()
     scene = dataclasses.replace(cylinder_grid(), gravity=np.array([0.0, -gravity, 0.0]))
-    way = BodyTrack([over(13.0, a) for a in (9.0, 10.5, 12.0)], 0.1016)
+    way = BodyTrack([over(13.0, a) for a in (9.0, 10.0, 11.0)], 0.1016)
     given = AlongOptions(options.motion, options.stances.margin)
     return plan_along(machines.climber("walker"), scene, way, None, given)
 

@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 from tests.climb.arriving import arrives
+from tests.climb.test_search import check
 from tests.distances import coal_distance
 from tests.repeats import repeats
 from tests.robots.files import example
@@ -18,6 +19,7 @@ from wbc.climb.contacts import PointFoot
 from wbc.climb.request import ClimberRequest
 from wbc.climb.scene import size_of
 from wbc.climb.scenes import draw, placed
+from wbc.climb.search import StanceOptions, find_stances
 from wbc.climb.session import climber_of
 from wbc.climb.stance import FREE_LIMB
 from wbc.climb.world import ClimbWorld, PostureOutcome
@@ -149,3 +151,14 @@ def test_humanoids_of_files_stand_on_their_soles_and_lift_either_foot(name: str)
         kept = np.where(np.arange(2) == limb, FREE_LIMB, contacts).astype(np.int32)
         outcomes = [world.lift(contacts, kept, 0.02, state, attempt)[0] for attempt in range(4)]
         assert PostureOutcome.STANDS in outcomes
+
+
+@pytest.mark.parametrize(("name", "family"), [("g1", "stairs"), ("talos", "stairs"), ("talos", "rubble")])
+def test_humanoids_of_files_find_their_stances(name: str, family: str) -> None:
+    """With angles at limits of joints, and arms that would be in the way of legs as the file has them."""
+    file, feet = HUMANOIDS[name]
+    climber = climber_of(ClimberRequest(str(example(file)), limbs=(feet,), hold="flat"))
+    course = draw(family, size_of(climber))
+    start = first_stance(climber, course.scene, placed(climber, course.start))
+    goal = BodyPlace(climber.body_pose(placed(climber, course.goal)).translation)
+    check(climber, course.scene, find_stances(climber, course.scene, start, goal, StanceOptions(moves=6000)))

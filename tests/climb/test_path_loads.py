@@ -9,17 +9,19 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from scipy.interpolate import CubicSpline
+from scipy.linalg import block_diag
+from scipy.optimize import linprog
 
 from tests.climb.bearing import slack_by_scipy
+from tests.climb.test_balance import around
 from tests.repeats import covering, repeats
-from wbc.climb import BodyPlace, ClimbOptions, ClimbScene, StanceOptions, find_stances, first_stance, plan_climb, scenes
+from wbc.climb import BodyPlace, ClimbOptions, StanceOptions, find_stances, first_stance, plan_climb, scenes
 from wbc.climb.balance import Equilibrium
-from wbc.climb.climber import Climber
 from wbc.climb.loop import PlanReference
 from wbc.climb.machines import climber
 from wbc.climb.motion import MotionOptions, Mover
 from wbc.climb.plan import ContactPlan
-from wbc.climb.scene import Foothold, size_of
+from wbc.climb.scene import size_of
 from wbc.climb.stance import FREE_LIMB
 from wbc.climb.time_law import MotionSpeeds, fastest
 from wbc.trajectory.least_time.reachability import SpeedProgram
@@ -30,27 +32,17 @@ from wbc.validation import Array
 H = 1e-3
 #: Instants of a plan that are looked at
 INSTANTS = 60
+#: Motors of a quadruped that bind as it walks [N m]
+WEAK = 50.0
 #: What differences of cubics between knots of 20 ms are off, in weights
 DIFFERENCES = 2e-3
-
-
-def _around(robot: Climber, rng: np.random.Generator) -> ClimbScene:
-    """Tilted footholds near the contacts at rest."""
-    holds = []
-    for limb in range(len(robot.limbs)):
-        pose = robot.contact_pose(robot.rest, limb)
-        if robot.fixed(limb) == "position":
-            pose = pin.SE3(np.eye(3), pose.translation)
-        tilt = pin.SE3(pin.exp3(rng.uniform(-0.3, 0.3, 3)), rng.uniform(-0.1, 0.1, 3))
-        holds.append(Foothold(str(limb), pose * tilt, friction=float(rng.choice([0.3, 0.7]))))
-    return ClimbScene(holds, {}, np.array([0.0, 0.0, -9.81]))
 
 
 @pytest.mark.parametrize(("name", "seed"), covering(("anymal_c", "talos_hands", "hexapod_grips"), range(repeats(2))))
 def test_slacks_of_wrenches_are_those_of_weights_elsewhere_and_their_bounds_hold(name: str, seed: int) -> None:
     """A wrench without a moment along its force is a weight in another direction, at another place."""
     robot, rng = climber(name), np.random.default_rng(seed)
-    scene = _around(robot, rng)
+    scene = around(robot, rng, lean=0.3, most=0.7)
     balance, contacts = Equilibrium(robot, scene), list(range(len(robot.limbs)))
     point = rng.uniform(-0.2, 0.2, 3)
     center, wrenches, wanted = robot.center_of_mass(robot.rest), [], []
@@ -109,6 +101,50 @@ def test_motions_keep_their_share_of_slack(name: str, seed: int) -> None:
         assert plan.margin > 0.0
     assert least > -DIFFERENCES
     assert used > 0.4, "least time uses what it may"
+
+
+def _driven(plan: ContactPlan, reference: PlanReference, time: float, friction: float) -> float:
+    """The least share of the efforts by which motors and point feet carry out a plan at a time."""
+    robot, held = plan.climber.robot, plan.contacts_at(time)
+    model, data = robot.model, robot.model.createData()
+    before, q, after = (reference.q(time + k * H) for k in (-1, 0, 1))
+    rates = pin.difference(model, before, q) / H, pin.difference(model, q, after) / H
+    own = pin.rnea(model, data, q, (rates[0] + rates[1]) / 2, (rates[1] - rates[0]) / H)
+    pin.computeJointJacobians(model, data, q)
+    pulls, cones = [], []
+    for limb, row in zip(plan.climber.limbs, held, strict=True):
+        if row == FREE_LIMB:
+            continue
+        frame = model.getFrameId(limb.frame)
+        pin.updateFramePlacement(model, data, frame)
+        rotation = plan.scene.footholds[row].pose.rotation
+        jacobian = pin.getFrameJacobian(model, data, frame, pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+        arm = data.oMf[frame].rotation @ limb.placement.translation
+        arm = arm - limb.contact.height * rotation[:, 2]
+        pulls.append((jacobian[:3] - pin.skew(arm) @ jacobian[3:]).T @ rotation)
+        cones.append(limb.contact.lower(plan.scene.footholds[row].friction, friction).cone()[0][:9, :3])
+    pulled, most = np.hstack(pulls), robot.limits.effort[6:, None]
+    cone = np.hstack([block_diag(*cones), np.zeros((9 * len(cones), 1))])
+    rows = np.vstack([np.hstack([-pulled[6:], -most]), np.hstack([pulled[6:], -most]), cone])
+    sides = np.concatenate([-own[6:], own[6:], np.zeros(len(cone))])
+    count = pulled.shape[1]
+    answer = linprog(np.append(np.zeros(count), 1.0), rows, sides, np.hstack([pulled[:6], np.zeros((6, 1))]), own[:6],
+                     [(None, None)] * count + [(0.0, None)])  # fmt: skip
+    return float(answer.fun) if answer.status == 0 else np.inf
+
+
+def test_moves_are_as_fast_as_motors_allow() -> None:
+    strong = climber("anymal_c")
+    robot = replace(strong, robot=strong.robot.with_limits(effort=WEAK))
+    course, options = scenes.draw("stepping_stones", size_of(robot), 0), ClimbOptions.by_torques()
+    start = first_stance(robot, course.scene, scenes.placed(robot, course.start), options.stances)
+    ahead = robot.body_pose(start.q).translation + [0.3 * size_of(robot), 0.0, 0.0]
+    plan = plan_climb(robot, course.scene, start, BodyPlace(ahead), options)
+    reference = PlanReference(plan, robot.robot)
+    middles = (plan.times[1:] + plan.times[:-1])[np.diff(plan.times) > 4 * H] / 2
+    shares = [_driven(plan, reference, float(time), 0.75) for time in middles[:: max(1, len(middles) // 300)]]
+    # Of what is left at rest motion uses half
+    assert 0.75 < max(shares) < 0.5 * (1.0 + 0.75) + 0.02
 
 
 @pytest.mark.parametrize("count", [1, 3, 8])

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import wbc
-from tests.loops.mechanisms import NAMED, SPECIAL, random_linkage, within
+from tests.loops.mechanisms import MOTORS, NAMED, SPECIAL, random_linkage, with_motors, within
 from tests.loops.test_long_runs import bounded
 from tests.loops.test_torques import moving, rows_at
 from tests.repeats import repeats
@@ -20,10 +22,10 @@ DT = 0.005
 ROUNDED = 1e-9
 
 
-def controller_of(robot: Robot) -> wbc.Controller:
+def controller_of(robot: Robot, command: str = "velocity", solver: str = "daqp") -> wbc.Controller:
     """Towards a posture within limits."""
     stack = wbc.Stack(robot, DT).add(wbc.tasks.Posture(), name="posture").add(wbc.tasks.JointLimits())
-    return stack.compile(backend="vm")
+    return stack.compile(command=command, backend="vm", solver=solver)
 
 
 def ways(robot: Robot, q: Array) -> Array:
@@ -66,9 +68,8 @@ def test_a_linkage_of_three_motions(state: tuple[Array, Array, Array]) -> None:
         assert max(robot.loop_gaps(q).values()) <= 1e-9, k
 
 
-@pytest.mark.parametrize("seed", range(repeats(12)))
-def test_loops_stay_closed_where_joints_cannot_follow(seed: int) -> None:
-    """Velocities are measured from which no joint brakes: limits of acceleration give way, and are named."""
+def too_fast(seed: int) -> tuple[Robot, wbc.Controller, Array, Array]:
+    """(a linkage, its controller, a configuration, a velocity that its loops allow and from which no joint brakes)."""
     rng, every = np.random.default_rng(seed), [*NAMED.values(), *SPECIAL.values()]
     text = random_linkage(seed) if seed % 3 else every[seed // 3 % len(every)]
     acceleration = float(rng.choice([1.0, 3.0]))
@@ -79,50 +80,158 @@ def test_loops_stay_closed_where_joints_cannot_follow(seed: int) -> None:
     controller = controller_of(robot)
     controller.reset(q)
     controller["posture"].target = pin.integrate(robot.model, q, rng.normal(size=robot.nv))
+    return robot, controller, q, v
+
+
+def named(robot: Robot, step: wbc.Step, v: Array) -> None:
+    """Loops have not given way; limits of acceleration that have are in ``relaxed``."""
+    assert not [given for given in step.relaxed if given.item == "mechanism"]
+    beyond = np.maximum(np.abs(step.v - v) - robot.limits.acceleration * DT, 0.0)
+    limits = {given.row for given in step.relaxed if given.item == "joint_limits"}
+    assert {robot.dof_names[i] for i in np.flatnonzero(beyond > 1e-8)} <= limits
+    assert (step.status != "solved") >= bool(limits)
+
+
+@pytest.mark.parametrize("seed", range(repeats(12)))
+def test_loops_stay_closed_where_joints_cannot_follow(seed: int) -> None:
+    """Velocities are measured from which no joint brakes: limits of acceleration give way, and are named."""
+    robot, controller, q, v = too_fast(seed)
     for k in range(60):
         step = controller.step(q, v)
         assert step.status in ("solved", "relaxed")
-        assert not [given for given in step.relaxed if given.item == "mechanism"]
-        beyond = np.maximum(np.abs(step.v - v) - acceleration * DT, 0.0)
-        named = {given.row for given in step.relaxed if given.item == "joint_limits"}
-        assert {robot.dof_names[i] for i in np.flatnonzero(beyond > 1e-8)} <= named, k
-        assert (step.status == "relaxed") >= bool(named)
+        named(robot, step, v)
         q, v = pin.integrate(robot.model, q, step.v * DT), np.array(step.v)
         assert max(robot.loop_gaps(q).values()) <= 1e-9, k
+
+
+@pytest.mark.parametrize("seed", range(repeats(8)))
+@pytest.mark.parametrize("solver", ["python", "osqp"])
+def test_other_solvers_keep_the_order(seed: int, solver: str) -> None:
+    """Ticks are relaxed where native ones are, or by another solver in place of one without an answer."""
+    robot, controller, q, v = too_fast(seed)
+    other = controller_of(robot, solver=solver)
+    other.reset(q)
+    other["posture"].target = controller["posture"].target
+    for k in range(20):
+        step, own = other.step(q, v), controller.step(q, v)
+        assert step.status in (own.status, *["recovered"] * (solver == "osqp")), k
+        named(robot, step, v)
+        assert max(robot.loop_gaps(pin.integrate(robot.model, q, step.v * DT)).values()) <= 1e-9, k
+        q, v = pin.integrate(robot.model, q, own.v * DT), np.array(own.v)
+
+
+def between_stops(free: Robot, q: Array, rng: np.random.Generator, rooms: Sequence[float]) -> Robot:
+    """A linkage of one motion with a joint that has so much room one way, and another with so much the other way."""
+    (way,), index = ways(free, q), free.position_index
+    low, high = free.limits.position_lower.copy(), free.limits.position_upper.copy()
+    joints = rng.choice(np.flatnonzero(np.abs(way) > 1e-3), 2, replace=False)
+    for k, sign, room in zip(joints, (1.0, -1.0), rooms, strict=True):
+        if sign * way[k] > 0.0:
+            low[k], high[k] = min(low[k], q[index[k]] - 1.0), q[index[k]] + room
+        else:
+            low[k], high[k] = q[index[k]] - room, max(high[k], q[index[k]] + 1.0)
+    return free.with_limits(position_lower=low, position_upper=high)
 
 
 #: Linkages with one motion
 ONE_WAY = ("four_bar", "jansen", "hoekens", "bennett", "parallelogram", "gripper", "43")
 
 
+@pytest.mark.parametrize("command", ["velocity", "acceleration"])
 @pytest.mark.parametrize("seed", range(repeats(16)))
-def test_a_linkage_between_two_stops_stands(seed: int) -> None:
+def test_a_linkage_between_two_stops_stands(seed: int, command: str) -> None:
     """One joint is at its limit one way, another the other way, by rounding: the tick is solved, and nothing moves."""
     rng, name = np.random.default_rng(seed), ONE_WAY[seed % len(ONE_WAY)]
     text = random_linkage(int(name)) if name.isdigit() else {**NAMED, **SPECIAL}[name]
     free = wbc.robots.load(text, shapes="none", velocity=3.0, acceleration=float(rng.choice([1.0, 5.0, 100.0])))
     q, _ = moving(free, rng)
-    (way,), index = ways(free, q), free.position_index
-    i, j = rng.choice(np.flatnonzero(np.abs(way) > 1e-3), 2, replace=False)
-    low, high = free.limits.position_lower.copy(), free.limits.position_upper.copy()
-    for k, sign in ((i, 1.0), (j, -1.0)):
-        room = 0.0 if rng.random() < 0.5 else 10.0 ** rng.uniform(-13.0, -9.0)
-        if sign * way[k] > 0.0:
-            low[k], high[k] = min(low[k], q[index[k]] - 1.0), q[index[k]] + room
-        else:
-            low[k], high[k] = q[index[k]] - room, max(high[k], q[index[k]] + 1.0)
-    robot = free.with_limits(position_lower=low, position_upper=high)
+    rooms = [0.0 if rng.random() < 0.5 else 10.0 ** rng.uniform(-13.0, -9.0) for _ in range(2)]
+    robot = between_stops(free, q, rng, rooms)
+    low, high, index = robot.limits.position_lower, robot.limits.position_upper, robot.position_index
     q = pin.integrate(robot.model, q, 3e-11 * rng.normal(size=robot.nv))
     q[index] = np.clip(q[index], low, high)
-    start, controller = q, controller_of(robot)
+    start, controller, v = q, controller_of(robot, command), np.zeros(robot.nv)
     controller.reset(q)
     for k in range(120):
         if k % 40 == 0:
             controller["posture"].target = pin.integrate(robot.model, q, rng.normal(size=robot.nv))
-        step = controller.step(q)
+        step = controller.step(q, v)
         assert step.status == "solved", (k, step)
-        q = pin.integrate(robot.model, q, step.v * DT)
+        v = np.array(step.v)
+        q = pin.integrate(robot.model, q, v * DT) if command == "velocity" else np.array(step.q_next)
         assert max(robot.loop_gaps(q).values()) <= 1e-9, k
         assert (q[index] >= low - ROUNDED).all()
         assert (q[index] <= high + ROUNDED).all()
     assert np.abs(robot.difference(start, q)).max() < 1e-4
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 24, 48, 56])
+def test_a_linkage_turns_back_between_two_stops(seed: int) -> None:
+    """Of accelerations, between stops up to 1e-3 apart: what holds it before one limit lets it turn before another."""
+    rng = np.random.default_rng(100 + seed)
+    text = {**NAMED, **SPECIAL}[("jansen", "four_bar", "gripper", "hoekens")[seed % 4]]
+    free = wbc.robots.load(text, shapes="none", velocity=3.0, acceleration=100.0)
+    q, _ = moving(free, rng)
+    robot = between_stops(free, q, rng, 10.0 ** rng.uniform((-13.0, -5.0), (-11.0, -3.0)))
+    low, high, index = robot.limits.position_lower, robot.limits.position_upper, robot.position_index
+    controller, v = controller_of(robot, "acceleration"), np.zeros(robot.nv)
+    controller.reset(q)
+    for k in range(400):
+        if k % 40 == 0:
+            controller["posture"].target = pin.integrate(robot.model, q, rng.normal(size=robot.nv))
+        step = controller.step(q, v)
+        assert step.status == "solved", (k, step)
+        q, v = np.array(step.q_next), np.array(step.v)
+        assert (q[index] >= low - ROUNDED).all()
+        assert (q[index] <= high + ROUNDED).all()
+
+
+@pytest.mark.parametrize("seed", range(repeats(6)))
+def test_limits_that_closed_loops_pass_give_way(seed: int) -> None:
+    """Next to stops, of loops that are open by rounding: what closes them keeps limits of acceleration, or the tick
+    names those.
+    """
+    rng, text = np.random.default_rng(seed), (random_linkage(60), NAMED["gripper"], NAMED["ankle"])[seed % 3]
+    free = wbc.robots.load(text, shapes="none", velocity=3.0, acceleration=20.0)
+    begin, _ = moving(free, rng)
+    low, high = free.limits.position_lower.copy(), free.limits.position_upper.copy()
+    for k in np.flatnonzero((free.position_index >= 0) & (rng.random(free.nv) < 0.5)):
+        (low if rng.random() < 0.5 else high)[k] = begin[free.position_index[k]]
+    robot = free.with_limits(position_lower=low, position_upper=high)
+    controller, solved = controller_of(robot, "acceleration"), 0
+    for _ in range(100):
+        near = pin.integrate(robot.model, begin, 10.0 ** rng.uniform(-11.0, -1.0) * rng.normal(size=robot.nv))
+        q = free.closed(near)
+        q = pin.integrate(robot.model, q, 10.0 ** rng.uniform(-13.0, -9.0) * rng.normal(size=robot.nv))
+        v = ways(robot, q).T @ rng.normal(size=len(ways(robot, q)))
+        v *= 10.0 ** rng.uniform(-6.0, 0.4) / np.abs(v).max()
+        controller.reset(q)
+        controller["posture"].target = pin.integrate(
+            robot.model, q, 10.0 ** rng.uniform(-6.0, 0.3) * rng.normal(size=robot.nv)
+        )
+        for _ in range(4):
+            step = controller.step(q, v)
+            beyond = np.abs(step.v - v) / DT - robot.limits.acceleration
+            limits = {given.row for given in step.relaxed if given.item == "joint_limits"}
+            assert {robot.dof_names[i] for i in np.flatnonzero(beyond > 1e-7)} <= limits, step
+            assert (step.status != "solved") >= bool(limits)
+            solved += step.status == "solved"
+            q, v = np.array(step.q_next), np.array(step.v)
+    assert solved > 100
+
+
+def test_a_gripper_at_rest_returns_to_its_limit() -> None:
+    """Torques: a joint that is beyond its limit by rounding goes back, though nothing says which way it came."""
+    text = with_motors(NAMED["gripper"], MOTORS["gripper"])
+    free = wbc.robots.load(text, shapes="none", velocity=3.0, acceleration=20.0)
+    knuckle = free.dof_names.index("left_knuckle")
+    q = free.neutral
+    robot = free.with_limits(position_upper={"left_knuckle": float(q[free.position_index[knuckle]])})
+    controller, v = controller_of(robot, "torque"), 1e-18 * ways(robot, q)[0]
+    for sign in (-1.0, 1.0):
+        start = free.closed(pin.integrate(robot.model, q, 4e-13 * np.eye(robot.nv)[knuckle]))
+        controller.reset(start)
+        controller["posture"].target = pin.integrate(robot.model, q, np.eye(robot.nv)[knuckle])
+        step = controller.step(start, sign * v)
+        assert step.status == "solved", step
+        assert np.abs(step.a).max() < 1e-3

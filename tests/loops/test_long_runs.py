@@ -1,5 +1,5 @@
 """Random ticks within limits of position, velocity and acceleration, of velocities, accelerations and torques; with
-``REPEATS=200`` 10^5 of each mechanism and linkage.
+``REPEATS=400`` 10^5 of each mechanism and linkage.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ DT = 0.005
 #: Mechanisms by name
 EVERY = {**NAMED, **SPECIAL}
 #: Ticks of a mechanism
-TICKS = repeats(500)
+TICKS = repeats(250)
 #: Linkages that are drawn, at most 48
 LINKAGES = min(repeats(6), 48)
 #: Ticks from one start towards random postures

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-import coal
 import numpy as np
 import pinocchio as pin
 
 import wbc
-from wbc.plan import PlannedPath
+from tests.distances import coal_shape
+from tests.loops.mechanisms import NAMED
+from wbc.plan import MotionPlanner, PlannedPath
 from wbc.robot import Robot
-from wbc.shapes import Box, Capsule, Cylinder, Sphere
+from wbc.shapes import Box, Cylinder
 
 #: Sides and place of the boards of a shelf before a Panda [m]
 SHELF = (
@@ -77,6 +78,28 @@ def standing_g1(seed: int) -> tuple[wbc.Stack, np.ndarray, tuple[np.ndarray, np.
     return stack, q, (over, under)
 
 
+def tray() -> tuple[MotionPlanner, tuple[str, str]]:
+    """A PR2 that keeps a tray in both hands, and these."""
+    robot = wbc.robots.load("pr2", base="fixed", lock=["?_gripper_*", "laser_*", "torso_*", "head_*"], shapes="none")
+    hands = robot.frames["left_hand"], robot.frames["right_hand"]
+    stack = wbc.Stack(robot, dt=0.01)
+    stack.add(wbc.tasks.RelativePose(*hands), name="tray")
+    stack.add(wbc.tasks.EndEffector(hands[0], kind="position"), name="left")
+    stack.add(wbc.tasks.JointLimits())
+    return stack.planner(keep=("tray",)), hands
+
+
+def mechanism(name: str, rng: np.random.Generator) -> tuple[wbc.Stack, np.ndarray, np.ndarray]:
+    """One with closed loops, and configurations that small steps lead between."""
+    robot = wbc.robots.load(NAMED[name])
+    stack = wbc.Stack(robot, dt=0.01).add(wbc.tasks.JointLimits())
+    way = rng.normal(size=robot.nv)
+    start = goal = robot.closed(robot.neutral)
+    for _ in range(15):
+        goal = robot.closed(robot.integrate(goal, 0.05 * np.sqrt(robot.nv) * way / np.linalg.norm(way)))
+    return stack, start, goal
+
+
 class CoalJudge:
     """Distances of the bodies of a stack by Coal.
 
@@ -92,7 +115,7 @@ class CoalJudge:
             frame = self.model.frames[self.model.getFrameId(link)]
             for k, placed in enumerate(shapes):
                 pose = frame.placement * placed.placement * pin.SE3(np.eye(3), placed.shape.center)
-                body = pin.GeometryObject(f"{link} {k}", frame.parentJoint, pose, _coal(placed.shape))
+                body = pin.GeometryObject(f"{link} {k}", frame.parentJoint, pose, coal_shape(placed.shape))
                 numbers.setdefault(link, []).append(self.bodies.addGeometryObject(body))
         self.required: list[float] = []
         for entry in stack.constraints:
@@ -104,7 +127,7 @@ class CoalJudge:
             elif isinstance(item, wbc.tasks.Obstacle):
                 pose = (poses or {}).get(entry.name, item.pose)
                 shape = item.parts[0]
-                other = pin.GeometryObject(entry.name, 0, pose * pin.SE3(np.eye(3), shape.center), _coal(shape))
+                other = pin.GeometryObject(entry.name, 0, pose * pin.SE3(np.eye(3), shape.center), coal_shape(shape))
                 number = self.bodies.addGeometryObject(other)
                 for link, k, _ in item.pairs(robot):
                     self.bodies.addCollisionPair(pin.CollisionPair(numbers[link][k], number))
@@ -124,14 +147,3 @@ class CoalJudge:
             for share in np.linspace(0.0, 1.0, int(np.linalg.norm(other - one) / step) + 2):
                 out = min(out, self.margin(path.coordinates.configuration(one + share * (other - one))))
         return out
-
-
-def _coal(shape: Any) -> Any:
-    if isinstance(shape, Capsule):
-        return coal.Capsule(shape.radius, shape.length)
-    if isinstance(shape, Cylinder):
-        return coal.Cylinder(shape.radius, shape.length)
-    if isinstance(shape, Box):
-        return coal.Box(*shape.size)
-    assert isinstance(shape, Sphere)
-    return coal.Sphere(shape.radius)

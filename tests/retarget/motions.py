@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from tests.retarget import clips
 from wbc.multibody import pin
 from wbc.retarget import Clip, Retargeted, Skeleton
-from wbc.retarget.solids import LinkBalls
+from wbc.robot.geometry.link_balls import LinkBalls
 
 Array = NDArray[np.float64]
 

@@ -50,17 +50,6 @@ def test_units_that_are_not_metric_are_found(tmp_path: Path, unit: float, name: 
 def test_positions_at_every_joint(tmp_path: Path) -> None:
     whole = read(tmp_path, clips.bvh(WALK, every=True))
     np.testing.assert_allclose(whole.points, WALK.points, atol=1e-7)
-    # Some writers count them from the offset: zeros
-    lines = clips.bvh(WALK, every=True).splitlines()
-    start = next(number for number, line in enumerate(lines) if line.startswith("Frame Time")) + 1
-    joints = sum("CHANNELS" in line for line in lines)
-    table = np.array([[float(word) for word in line.split()] for line in lines[start:]])
-    columns = [6 * joint + axis for joint in range(1, joints) for axis in range(3)]
-    table[:, columns] = 0.0
-    text = "\n".join([*lines[:start], *(" ".join(f"{number:.9f}" for number in row) for row in table)])
-    counted = read(tmp_path, text)
-    np.testing.assert_allclose(counted.points, WALK.points, atol=1e-7)
-    assert "counted from its offset" in " ".join(counted.notes)
 
 
 @pytest.mark.parametrize("up", ["y", "z"])
@@ -146,16 +135,6 @@ def test_frames_without_numbers_are_filled_and_said(tmp_path: Path) -> None:
     assert clip.seen[:20].all()
     assert np.abs(clip.points - WALK.points).max() < 0.02
     assert "4 of" in " ".join(clip.notes)
-
-
-def test_bones_without_length_are_said(tmp_path: Path) -> None:
-    offsets = WALK.skeleton.offsets.copy()
-    joint = WALK.skeleton.names.index("LeftToe")
-    text = clips.bvh(WALK)
-    line = "OFFSET " + " ".join(f"{x:.9f}" for x in offsets[joint] @ clips.AXES["y"] / 0.01)
-    assert line in text
-    clip = read(tmp_path, text.replace(line, "OFFSET 0 0 0"))
-    assert "bones without length end at LeftToe, RightToe" in " ".join(clip.notes)
 
 
 @pytest.mark.parametrize("rate", [10.0, 59.94, 240.0, 1000.0])

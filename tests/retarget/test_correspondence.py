@@ -22,6 +22,8 @@ HUMANOIDS = {
     "talos": ("leg_left_4_joint", "leg_left_5_joint", "arm_left_4_joint", "arm_left_6_joint"),
     "icub": ("l_knee", "l_ankle_pitch", "l_elbow", "l_wrist_pitch"),
     "romeo": ("LKneePitch", "LAnklePitch", "LElbowYaw", "LWristYaw"),
+    # Its arms point ahead at rest, and none of its files of bodies is there
+    "romeo_laas_small": ("LKneePitch_joint", "LAnklePitch_joint", "LElbowYaw_joint", "LWristYaw_joint"),
     "simple_humanoid": ("LLEG_KNEE", "LLEG_ANKLE_P", "LARM_ELBOW", "LARM_WRIST_P"),
     "human": ("left_knee_Z", "left_ankle_Z", "left_elbow_Z", "left_wrist_Z"),
 }
@@ -43,6 +45,15 @@ def carrier(found: RobotBody, frame: str) -> str:
     """Name of the joint that carries a frame."""
     model = found.robot.model
     return str(model.names[model.frames[model.getFrameId(frame)].parentJoint])
+
+
+def test_a_leg_goes_on_to_its_foot_and_not_along_the_rods_that_move_it() -> None:
+    found = body("cassie")
+    for side in ("left", "right"):
+        leg = found.limbs[f"{side}_leg"]
+        assert carrier(found, leg.end) == f"{side}-foot-op"
+        assert carrier(found, leg.middle) == f"{side}-shin-tarsus-joint"
+        assert leg.bend == -1.0
 
 
 @pytest.mark.parametrize("name", HUMANOIDS)

@@ -137,8 +137,8 @@ def test_processes_answer_for_clips_that_cannot_be_read(tmp_path: Path) -> None:
         file.write_text("HIERARCHY\n")
         jobs.append(ClipJob(file, tmp_path / "out" / str(number), "simple_humanoid"))
     done = list(retarget_clips(jobs, workers=2))
-    assert {answer.job.clip for answer in done} == {job.clip for job in jobs}
-    assert all("cut off" in answer.reason for answer in done)
+    assert {job.clip for job, _, _ in done} == {job.clip for job in jobs}
+    assert all("cut off" in reason for _, _, reason in done)
 
 
 def test_results_as_json(walks: Path, tmp_path: Path) -> None:
@@ -164,7 +164,7 @@ def test_who_stops_asking_ends_the_processes(tmp_path: Path) -> None:
     # Tests before this one may have left children of their own
     others = set(multiprocessing.active_children())
     answers = retarget_clips(jobs, workers=2)
-    assert next(answers).job.clip.stem == "first"
+    assert next(answers)[0].clip.stem == "first"
     before = set(multiprocessing.active_children()) - others
     assert before
     start = time.monotonic()

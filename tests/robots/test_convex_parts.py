@@ -65,7 +65,32 @@ def test_inner_and_flat_components() -> None:
     assert len(found.parts[0].points) == 8
 
 
+#: A tetrahedron with edges of 1 unit
+COLLADA = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset>{unit}</asset>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="n" count="12">0 0 0 1 0 0 0 1 0 0 0 1</float_array>
+<technique_common><accessor source="#n" count="4" stride="3">
+<param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/></accessor></technique_common>
+</source><vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="4"><input semantic="VERTEX" source="#v" offset="0"/><p>0 2 1 0 1 3 0 3 2 1 2 3</p></triangles>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node><instance_geometry url="#g"/></node></visual_scene>
+</library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
+
+
+@pytest.mark.parametrize(("unit", "metres"), [("", 1.0), ('<unit meter="0.01"/>', 0.01), ('<unit meter="1"/>', 1.0)])
+def test_the_unit_of_a_collada_file_counts(unit: str, metres: float, tmp_path: Path) -> None:
+    file = tmp_path / "part.dae"
+    file.write_text(COLLADA.format(unit=unit))
+    (part,) = wbc.robots.convex_parts(file, scale=[1.0, 1.0, 2.0]).parts
+    np.testing.assert_allclose(np.sort(part.points, axis=0), np.sort(CORNERS * [metres, metres, 2.0 * metres], axis=0))
+
+
 def test_bad_meshes(tmp_path: Path) -> None:
+    for unit, reason in (("0", "its unit is 0 m"), ("inch", "its unit cannot be read")):
+        (tmp_path / "x.dae").write_text(COLLADA.format(unit=f'<unit meter="{unit}"/>'))
+        assert_refused(lambda: wbc.robots.convex_parts(tmp_path / "x.dae"), RobotFileError, reason)
     with pytest.raises(RobotFileError, match="no component has a volume"):
         wbc.robots.convex_parts(CORNERS * [1, 1, 0], FACES)
     for faces in (FACES + 1, FACES - 1, FACES.astype(float), FACES[:, :2], [1, 2, 3]):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -9,8 +11,9 @@ import pytest
 import wbc.robots
 from tests.models import placement
 from tests.refusals import assert_refused
+from tests.repeats import repeats
 from tests.robots.files import DATA, example, joints
-from wbc.errors import NotFiniteError, RangeError, ShapeError, UnknownNameError
+from wbc.errors import BoundsError, NotFiniteError, RangeError, ShapeError, UnknownNameError
 
 RECIPES = {recipe.name: recipe for recipe in wbc.robots.table() if not recipe.problem}
 WITH_MIMICS = [
@@ -46,6 +49,44 @@ def test_locking_one_end_of_a_pair_locks_the_other() -> None:
     np.testing.assert_allclose(one, pin.utils.rotate("z", -0.5), atol=1e-12)
 
 
+def test_what_followers_leave_of_a_leaders_range_is_said_and_nothing_is_refused(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Random limits, ratios and offsets, beside a leader's values one by one."""
+    rng, ends = np.random.default_rng(3), {"cut": 0, "refused": 0, "whole": 0}
+    for _ in range(repeats(30)):
+        low, high = np.sort(rng.uniform(-2.0, 2.0, (2, 2)), axis=0).tolist()
+        ratio, offset = float(rng.uniform(0.3, 2.0) * rng.choice([-1.0, 1.0])), rng.uniform(-0.5, 0.5)
+        joints = "".join(
+            f'<link name="l{k}"/><joint name="{name}" type="revolute"><parent link="root"/><child link="l{k}"/>'
+            f'<limit lower="{low[k]!r}" upper="{high[k]!r}" velocity="1" effort="1"/>{mimic}</joint>'
+            for k, (name, mimic) in enumerate(
+                {"lead": "", "follow": f'<mimic joint="lead" multiplier="{ratio!r}" offset="{offset!r}"/>'}.items()
+            )
+        )
+        (tmp_path / "pair.urdf").write_text(f'<robot name="pair"><link name="root"/>{joints}</robot>')
+        values = np.linspace(low[0], high[0], 20001)
+        followed = ratio * values + offset
+        left = values[(followed >= low[1]) & (followed <= high[1])]
+        caplog.clear()
+        if not left.size:
+            with pytest.raises(BoundsError, match=r"pair\.urdf: limits of lead: no value is left: follow follows it"):
+                wbc.robots.load(tmp_path / "pair.urdf")
+            # The caller may give limits that leave something
+            wbc.robots.load(tmp_path / "pair.urdf", position_lower=-9.0, position_upper=9.0)
+            ends["refused"] += 1
+            continue
+        robot = wbc.robots.load(tmp_path / "pair.urdf")
+        kept, at = robot.coupled(robot.limits), robot.dofs("lead").start
+        np.testing.assert_allclose([kept.position_lower[at], kept.position_upper[at]], left[[0, -1]], atol=1e-3)
+        cut = max(left[0] - low[0], high[0] - left[-1])
+        told = f"lead has {kept.position_lower[at]:.6g} to {kept.position_upper[at]:.6g} of its"
+        if abs(cut - 0.01) > 1e-3:
+            assert (told in caplog.text) == (told in robot.notes.get("mimic", "")) == (cut > 0.01)
+            ends["cut" if cut > 0.01 else "whole"] += 1
+    assert min(ends.values()) > 0, ends
+
+
 def test_bad_locks() -> None:
     with pytest.raises(UnknownNameError) as caught:
         wbc.robots.load("panda", lock=["panda_joint33"])
@@ -71,3 +112,9 @@ def test_a_model_with_pinocchios_own_mimic_joint_has_one_degree_of_freedom_less(
     assert (robot.nq, robot.nv, robot.couplings) == (8, 8, ())
     assert robot.dof_names[-1] == "panda_finger_joint1"
     assert wbc.robots.load(robot.model, lock="panda_joint3").nv == 7
+
+
+def test_a_robot_of_which_all_is_locked_has_no_motor() -> None:
+    robot = wbc.robots.load("panda", lock="*", shapes="none")
+    assert robot.motor_jacobian(robot.neutral).shape == (0, 0)
+    assert robot.at_motors(robot.neutral, []).shape == (0,)

@@ -36,11 +36,12 @@ def test_joint_equalities_become_couplings(caplog: pytest.LogCaptureFixture) -> 
     robot = wbc.robots.load(f"<mujoco><worldbody>{bodies}</worldbody><equality>{equalities}</equality></mujoco>")
     found = {robot.dof_names[c.follower]: (robot.dof_names[c.leader], c.ratio, c.offset) for c in robot.couplings}
     assert found == {"b": ("c", 4.0, 0.0), "a": ("c", -2.0, pytest.approx(0.05))}
-    assert not caplog.text
+    said = "c has -0.392699 to 0.392699 of its -1.5708 to 1.5708 left, by the limits of {}, which follows it"
+    assert caplog.messages == ["MuJoCo Model: " + "; ".join(said.format(name) for name in "ba")]
     more = equalities + '<joint name="curve" joint1="d" joint2="a" polycoef="0 1 1 0 0"/>'
     curved = wbc.robots.load(f"<mujoco><worldbody>{bodies}</worldbody><equality>{more}</equality></mujoco>")
     assert [loop.name for loop in curved.loops.loops] == ["curve"]
-    assert not caplog.text
+    assert caplog.messages[1:] == caplog.messages[:1]
 
 
 def test_meshes_are_found_from_the_files_own_folder(tmp_path: Path) -> None:

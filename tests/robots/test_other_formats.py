@@ -111,12 +111,16 @@ def test_poses_of_sdf_are_the_same_however_they_are_written(seed: int, tmp_path:
     assert_refused(lambda: read('rotation_format="angles"', place), RobotFileError, "'angles'")
 
 
-def stage_of(model: pin.Model, path: Path, unit: float, turned: bool) -> None:
-    """A model of joints with one coordinate as a stage of its own unit, bodies at a random configuration."""
+def stage_of(model: pin.Model, path: Path, unit: float, turned: bool, up: str, down: tuple[float, ...]) -> None:
+    """A model of joints with one coordinate as a stage of its own unit and up axis, bodies at a random configuration;
+    ``down``: where the gravity of its scene pulls, 0 for where the up axis says.
+    """
     from pxr import Gf, Usd, UsdGeom, UsdPhysics
 
     stage = Usd.Stage.CreateNew(str(path))
     UsdGeom.SetStageMetersPerUnit(stage, unit)
+    UsdGeom.SetStageUpAxis(stage, up)
+    UsdPhysics.Scene.Define(stage, "/scene").CreateGravityDirectionAttr(Gf.Vec3f(*down))
     data = model.createData()
     pin.forwardKinematics(model, data, pin.randomConfiguration(model))
 
@@ -165,14 +169,21 @@ def stage_of(model: pin.Model, path: Path, unit: float, turned: bool) -> None:
 def test_a_stage_is_the_robot_that_it_was_made_of(seed: int, tmp_path: Path) -> None:
     rng = np.random.default_rng(seed)
     given = wbc.robots.load(["panda", "ur5", "z1", "xarm7"][seed % 4])
-    stage_of(given.model, tmp_path / "x.usda", float(rng.choice([0.01, 1.0])), bool(seed % 2))
+    up, down, turn = (
+        ("Z", (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+        ("Y", (0.0, 0.0, 0.0), (np.pi / 2.0, 0.0, 0.0)),
+        ("Y", (0.0, 0.0, -2.0), (0.0, 0.0, 0.0)),
+        ("Z", (1.0, 0.0, 0.0), (0.0, np.pi / 2.0, 0.0)),
+    )[seed % 4]
+    upright = pin.SE3(pin.rpy.rpyToMatrix(*turn), np.zeros(3))
+    stage_of(given.model, tmp_path / "x.usda", float(rng.choice([0.01, 1.0])), bool(seed % 2), up, down)
     robot = wbc.robots.load(tmp_path / "x.usda")
     assert robot.joint_names == given.joint_names
     assert np.allclose(robot.limits.position_lower, given.limits.position_lower, atol=1e-5)
     q, data = given.random(rng), given.model.createData()
     pin.forwardKinematics(given.model, data, q)
     for j in range(1, given.model.njoints):
-        assert np.allclose(robot.pose(q, f"link{j}").homogeneous, data.oMi[j].homogeneous, atol=1e-6)
+        assert np.allclose(robot.pose(q, f"link{j}").homogeneous, (upright * data.oMi[j]).homogeneous, atol=1e-6)
     mass = pin.crba(given.model, data, q)
     assert np.allclose(pin.crba(robot.model, robot.model.createData(), q), mass, atol=1e-5 * np.abs(mass).max())
 
@@ -193,7 +204,8 @@ def test_what_a_stage_cannot_say_is_refused_by_name(tmp_path: Path, caplog: pyte
     distance = '\ndef PhysicsDistanceJoint "far" {\nrel physics:body1 = </a>\n}\n'
     file.write_text(head.format(more=', "PhysicsMassAPI"', mass=given) + distance)
     assert_refused(lambda: wbc.robots.load(file), RobotFileError, "PhysicsDistanceJoint")
-    file.write_text(head.format(more=', "PhysicsMassAPI", "PhysxRigidBodyAPI"', mass=given))
+    moon = 'def PhysicsScene "scene" {\nfloat physics:gravityMagnitude = 1.62\n}\n'
+    file.write_text(head.format(more=', "PhysicsMassAPI", "PhysxRigidBodyAPI"', mass=given) + moon)
     robot = wbc.robots.load(file)
     assert robot.base == "floating"
-    assert "not represented: PhysxRigidBodyAPI of a" in caplog.text
+    assert "not represented: PhysxRigidBodyAPI of a; gravity of 1.62 m/s^2, which is 9.81 here" in caplog.text

@@ -108,7 +108,8 @@ def test_random_files(seed: int, tmp_path: Path, caplog: pytest.LogCaptureFixtur
             if not any(str(path) in line and all(word in line for word in words) for line in said):
                 pytest.fail(f"seed {k}: nothing said of {fault} {words}: {said}")
         if not made.faults:
-            assert all("has no axis" in line or "nothing drives" in line for line in said), (k, said)
+            harmless = ("has no axis", "nothing drives", "which follows it")
+            assert all(any(words in line for words in harmless) for line in said), (k, said)
         try:
             check_limits(robot, made)
             check_motion(robot, made, rng)

@@ -209,3 +209,37 @@ def test_links_with_an_incomplete_inertial_weigh_nothing(tmp_path: Path, caplog:
     path.write_text(path.read_text().replace('izz="0.01"', 'izz="nan"'))
     wbc.robots.load(path)
     assert "weighs nothing" in caplog.text
+
+
+SAID = [
+    ('<orign xyz="1 0 0"/>', "not read: <orign> of joint 'j' (did you mean origin?)"),
+    ('<origin xyz="1 0 0"/>', "<origin> of joint 'j' is there 2 times, the first counts"),
+    ('<dynamics dampng="1" friction="0"/>', "not read: dampng in <dynamics> of joint 'j' (did you mean damping?)"),
+    (LIMIT.replace("/>", ' jerk="30"/>'), "limits of jerk are not held: j"),
+    (LIMIT.replace("/>", ' deceleration="0"/>'), "an acceleration of j is not above 0: unlimited"),
+]
+
+
+@pytest.mark.parametrize(("more", "said"), SAID)
+def test_what_is_not_read_of_a_file_is_said(
+    more: str, said: str, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    robot = wbc.robots.load(
+        write(tmp_path, joint("j", "revolute", "a", "b", more if "limit" in more else LIMIT + more))
+    )
+    assert said in caplog.text
+    assert any(said in note for note in robot.notes.values())
+    assert np.isinf(robot.limits.acceleration).all()
+
+
+def test_limits_of_acceleration_are_the_lesser_and_soft_limits_a_note(
+    tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    both = LIMIT.replace("/>", ' acceleration="7" deceleration="6"/>')
+    soft = LIMIT + '<safety_controller k_velocity="1" soft_lower_limit="-1" soft_upper_limit="2"/>'
+    chain = (joint("j", "revolute", "a", "b", both), joint("k", "revolute", "b", "c", soft))
+    robot = wbc.robots.load(write(tmp_path, *chain, '<loop_joint name="l"/>'))
+    np.testing.assert_array_equal(robot.limits.acceleration, [6.0, np.inf])
+    assert robot.notes["soft limits"].endswith("with_limits gives them: k -1 to 2")
+    assert "soft" not in caplog.text
+    assert "not read: <loop_joint>" in caplog.text

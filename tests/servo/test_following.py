@@ -7,15 +7,10 @@ import pinocchio as pin
 import pytest
 
 from tests.repeats import repeats
-from tests.servo.plants import DT, HOME, Drives, arm, controller
+from tests.servo.plants import DT, HOME, Drives
 from wbc.api import Controller
 from wbc.servo import Following, Response, Servo, identify
 from wbc.simulation import Command, CommandKind
-
-
-@pytest.fixture(scope="module")
-def control() -> Controller:
-    return controller(arm())
 
 
 def goal(start: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:

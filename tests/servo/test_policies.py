@@ -21,11 +21,6 @@ from wbc.simulation import Command, CommandKind
 KINDS = [str(kind) for kind in CommandKind]
 
 
-@pytest.fixture(scope="module")
-def control() -> Controller:
-    return controller(arm())
-
-
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_blocked_robot_slows_its_reference_and_then_stops_it_for_good(control: Controller, kind: str) -> None:
     drives = Drives(control.stack.robot, CommandKind(kind), lag=0.05, blocked=True)

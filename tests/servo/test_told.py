@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.repeats import repeats
-from tests.servo.plants import DT, Drives, arm, controller
+from tests.servo.plants import DT, Drives
 from tests.servo.random_servos import told_beside_untold
 from tests.servo.test_following import follow
 from wbc.api import Controller
@@ -19,11 +19,6 @@ from wbc.simulation import CommandKind
 #: In the short mode those that fell or stopped when they were told a delay that was too short
 FIRST = (88, 20, 4)
 SEEDS = [*FIRST, *(seed for seed in range(100) if seed not in FIRST)][: min(repeats(1), 100)]
-
-
-@pytest.fixture(scope="module")
-def control() -> Controller:
-    return controller(arm())
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
-from wbc import validation
 from wbc.cli.console import OutputError, out, table, tell
 from wbc.cli.reading import numbers
 from wbc.errors import ShapeError, WbcError
@@ -46,11 +45,12 @@ def check_output(file: Path | None, force: bool) -> None:
     """Whether results can be written.
 
     Raises:
-        UnknownNameError: neither CSV nor npz. OutputError: there is such a file, or there is no folder for it.
+        OutputError: neither CSV nor npz, there is such a file, or there is no folder for it.
     """
     if file is None:
         return
-    validation.one_of("out", file.suffix.lower(), SUFFIXES)
+    if file.suffix.lower() not in SUFFIXES:
+        raise OutputError("out", str(file), "how its name ends says what is written", SUFFIXES)
     if file.exists() and not force:
         raise OutputError("out", str(file), "there is a file of this name; choose another, or use --force")
     if not file.parent.is_dir():
@@ -80,10 +80,19 @@ def report(robot: Robot, frame: str, answers: list[TargetAnswer]) -> None:
             tell(f"target {a.target}: {a.reason}")
 
 
+def _angles(robot: Robot) -> Iterator[tuple[int, range]]:
+    """(degree of freedom, its numbers in q): one, or the cosine and sine of a joint that turns without end."""
+    for joint in robot.tree.joints:
+        if joint.nq == joint.nv:
+            yield from ((joint.idx_v + k, range(joint.idx_q + k, joint.idx_q + k + 1)) for k in range(joint.nv))
+        elif joint.nv == 1:
+            yield joint.idx_v, range(joint.idx_q, joint.idx_q + 2)
+
+
 def _joints(robot: Robot, answer: TargetAnswer) -> Table:
-    rows, limits = [], robot.limits
-    for k in np.flatnonzero(robot.position_index >= 0):
-        value = float(answer.solution.q[robot.position_index[k]])
+    rows, limits, q = [], robot.limits, answer.solution.q
+    for k, at in _angles(robot):
+        value = float(q[at[0]] if len(at) == 1 else np.arctan2(q[at[1]], q[at[0]]))
         bounds = (limits.position_lower[k], limits.position_upper[k])
         texts = (f"{b:.4g}" if np.isfinite(b) else "-" for b in bounds)
         rows.append((robot.dof_names[k], robot.dof_units[k], f"{value:.6f}", *texts))

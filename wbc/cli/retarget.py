@@ -95,14 +95,14 @@ class RetargetClips:
                         bar.advance(task)
             except KeyboardInterrupt:
                 interrupted = True
-        for done in ended:
-            say(_line(done)) if not done.reason else tell(f"failed: {done.job.clip}: {done.reason}")
-        failed = [done for done in ended if done.reason]
+        for job, figures, reason in ended:
+            say(_line(job, figures)) if not reason else tell(f"failed: {job.clip}: {reason}")
+        failed = [reason for _, _, reason in ended if reason]
         say(f"{out}: {len(jobs) - len(waiting) + len(ended) - len(failed)} of {len(jobs)} clips")
         data(
             {
                 "folder": str(out),
-                "clips": [{"file": str(done.job.clip), "reason": done.reason, **done.figures} for done in ended],
+                "clips": [{"file": str(job.clip), "reason": reason, **figures} for job, figures, reason in ended],
             }
         )
         if interrupted:
@@ -177,13 +177,12 @@ class RetargetClips:
             yield client
 
 
-def _line(done: ClipDone) -> str:
+def _line(job: ClipJob, figures: dict[str, Any]) -> str:
     """A clip that was retargeted, in a line."""
-    figures = done.figures
     parts = [
         f"{figures['frames']} frames", f"{figures['frames_a_second']:.4g} a second",
         f"slide {1e3 * figures['slide']:.3g} mm", f"gave way {len(figures['given_up'])}",
     ]  # fmt: skip
     if "penetration" in figures:
         parts.insert(3, f"below ground {1e3 * figures['penetration']:.3g} mm")
-    return f"{done.job.folder}: {', '.join(parts)}"
+    return f"{job.folder}: {', '.join(parts)}"

@@ -106,16 +106,20 @@ class SceneOptions:
 
 
 def tip_frame(robot: Robot, frame: str | None) -> str:
-    """The frame to move.
+    """The frame to move: the one that is named, else the tip or hand that the table knows, else, where the robot is one
+    chain of joints, the last frame on its last joint.
 
     Raises:
-        UnknownNameError: no such frame. WbcError: none given, and the table knows no tip of this robot.
+        UnknownNameError: no such frame. WbcError: none of these.
     """
     if frame is not None:
         return robot.check_frame("frame", frame)
     for role in ("tip", "right_hand", "left_hand"):
         if role in robot.frames:
             return robot.frames[role]
+    tree, last = robot.tree, robot.tree.njoints - 1
+    if last > 0 and all(tree.parents[j] == j - 1 for j in range(1, last + 1)):
+        return [str(frame.name) for frame in tree.frames if frame.parentJoint == last][-1]
     raise WbcError("frame", None, f"the table knows no tip of {robot.name}; choose with --frame", robot.frame_names[1:])
 
 

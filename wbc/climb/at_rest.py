@@ -8,6 +8,7 @@ from functools import reduce
 import numpy as np
 
 from wbc.climb.climber import Climber
+from wbc.climb.idle_joints import aside
 from wbc.climb.reach import LimbReach
 from wbc.multibody import pin
 from wbc.symbolic.joint_steps import place
@@ -32,7 +33,7 @@ def standing(climber: Climber) -> Climber:
         min over limbs of  min(sigma_min(J) / length, distance from limits of joints / ROOM_ENOUGH)
 
     J: of the contact's position by the limb's angles; length: of the limb stretched out. Knees are bent by about a
-    right angle then. Where limbs have no such postures it rests as before.
+    right angle then. Where limbs have no such postures it rests as before. Joints of no limb are as of :func:`aside`.
     """
     model, reach = climber.robot.model, LimbReach(climber)
     body, data, every = climber.body_pose(climber.rest), model.createData(), range(len(climber.limbs))
@@ -55,7 +56,8 @@ def standing(climber: Climber) -> Climber:
         return climber
     row = int(np.flatnonzero(least >= WORTH_KEPT * most)[0])
     rest = reduce(lambda q, limb: climber.with_limb(q, limb, found[limb][0][row]), every, climber.rest)
-    return replace(climber, rest=rest)
+    stands = replace(climber, rest=rest)
+    return replace(stands, rest=aside(stands, min(lengths)))
 
 
 def _upright(tip: pin.SE3) -> Array:

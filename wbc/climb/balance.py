@@ -108,6 +108,29 @@ class Equilibrium:
         held = self._checked(contacts)
         return self.world.wrench_slacks(self.world.places_of(held), self._poses(held, q), point, wrenches)
 
+    def driven_shares(
+        self, contacts: Sequence[int], q: Array, effort: float, wrenches: Array, torques: Array
+    ) -> list[float]:
+        """Which share of a motion contacts and motors can give beside what they give at rest, at most 1,
+
+            maximise  l    over wrenches and l  with  G w = r + l W,  A w <= b,  |tau - J'w + l T| <= effort tau_max
+
+        Args:
+            contacts, q, effort: as of :meth:`margin`.
+            wrenches: W of some motions ``(k, 6)``, about the centre of mass, in weights. torques: T ``(k, nv)``.
+
+        Raises:
+            ShapeError, RangeError: contacts that are none.
+        """
+        G, r, A, s, b, motors = self._program(self._checked(contacts), q, effort)
+        tied, none, shares = np.append(np.zeros(len(s)), 1.0), np.zeros(len(A) - 2 * len(motors)), list[float]()
+        for wrench, torque in zip(wrenches, torques[:, motors], strict=True):
+            column = np.concatenate([none, torque, -torque, [-1.0]])[:, None]
+            rows = np.hstack([np.vstack([A, np.zeros(A.shape[1])]), column])
+            given = np.hstack([G, -wrench[:, None]]), r, rows, tied, np.append(b, 0.0)
+            shares.append(self.world.largest_slack(*given))
+        return shares
+
     @cached_property
     def moving_model(self) -> pin.Model:
         """The robot's model in the gravity of the scene."""

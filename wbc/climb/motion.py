@@ -136,7 +136,9 @@ class Mover:
         self.climber, self.scene, self.options, self.balance = climber, scene, given, balance
         self.watch, self.closure = watch or PlanWatch(), Closure(climber)
         self.clearances = Clearances(climber, scene, given.clearance, given.apart)
-        self.timing, self.lift = PathTiming(climber, given.speeds), given.lift or size_of(climber) / 16.0
+        # Of what motors have left at rest, motion may use half
+        self.timing = PathTiming(climber, given.speeds, 0.5 * (1.0 + given.effort))
+        self.lift = given.lift or size_of(climber) / 16.0
         self._checked, self._made = WeakSet[Stance](), dict[bytes, tuple[TimedMove, float | None]]()
 
     def moved(self, one: Stance, other: Stance, row: int = 0) -> tuple[TimedMove, float | None]:

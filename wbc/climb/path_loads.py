@@ -14,7 +14,11 @@ from wbc.validation import Array
 #: Path step over which velocities are differentiated [1]
 DIFFERENCE = 1e-5
 #: Least slack at rest from which on a robot moves [weights]
-LEAST = 1e-4
+LEAST = 5e-4
+#: Of the grid, every so many points are looked at for what motors give
+DRIVEN_EVERY = 6
+#: Least share of accelerations to which a law is slowed for motors [1]
+SLOWEST = 0.01
 #: Rows that are added at once, those that lack most
 ADDED = 12
 
@@ -45,7 +49,7 @@ class PathLoads:
         self, balance: Equilibrium, path: MovePath, contacts: Sequence[int], s: Array, share: float
     ) -> None:  # fmt: skip
         self.s = s
-        self._balance, self._contacts, self._q = balance, contacts, path.q[0]
+        self._balance, self._contacts, self._q = balance, contacts, path.configurations(path.at(s))
         self._center = balance.climber.center_of_mass(path.q[0])
         self._still, self._pull, self._speed = self._wrenches(path, s)
         self.at_rest, bounds = self._slacks(self._still)
@@ -77,25 +81,43 @@ class PathLoads:
         self._bounds = np.unique(np.concatenate([self._bounds, new.round(12)]), axis=0)
         return float(1.0 / np.sqrt(min(1.0, part.min())))
 
+    def overdriven(self, u: Array, x: Array, effort: float) -> float:
+        """By which factor a law has to be slower, 1 for none, for motors that give this share of their efforts.
+
+        Args:
+            u, x: as of :meth:`lacking`. effort: [1].
+        """
+        least = 1.0
+        for k in range(0, len(self.s), DRIVEN_EVERY):
+            law = np.array([u[max(k - 1, 0)], u[min(k, len(u) - 1)]])[:, None]
+            wrenches, torques = (law * pull[k] + x[k] * speed[k] for pull, speed in
+                                 ((self._pull, self._speed), self._driving))  # fmt: skip
+            off = self._center - self._balance.climber.center_of_mass(self._q[k])
+            wrenches[:, 3:] += np.cross(off, wrenches[:, :3])
+            shares = self._balance.driven_shares(self._contacts, self._q[k], effort, wrenches, torques)
+            least = min(least, *shares)
+        return float(1.0 / np.sqrt(max(least, SLOWEST)))
+
     def _slacks(self, wrenches: Array) -> tuple[Array, Array]:
-        return self._balance.wrench_slacks(self._contacts, self._q, self._center, wrenches)
+        return self._balance.wrench_slacks(self._contacts, self._q[0], self._center, wrenches)
 
     def _wrenches(self, path: MovePath, s: Array) -> tuple[Array, Array, Array]:
         """C, A, B."""
         model, climber = self._balance.moving_model, self._balance.climber
-        data, zero, weight = model.createData(), np.zeros(model.nv), self._balance.world.weight
+        data, zero = model.createData(), np.zeros(model.nv)
 
         def velocities(s: Array) -> Array:
             return path.velocities(path.at(s), path.at(s, 1))
 
         first, second = velocities(s), (velocities(s + DIFFERENCE) - velocities(s - DIFFERENCE)) / (2.0 * DIFFERENCE)
-        q = path.configurations(path.at(s))
-        own = np.empty((3, len(s), 6))
+        q, weight = self._q, self._balance.world.weight
+        torques = np.empty((3, len(s), model.nv))
         for k in range(len(s)):
-            own[0, k] = pin.rnea(model, data, q[k], zero, zero)[:6]
-            own[1, k] = pin.rnea(model, data, q[k], zero, first[k])[:6]
-            own[2, k] = pin.rnea(model, data, q[k], first[k], second[k])[:6]
-        own[1:] -= own[0]
+            torques[0, k] = pin.rnea(model, data, q[k], zero, zero)
+            torques[1, k] = pin.rnea(model, data, q[k], zero, first[k])
+            torques[2, k] = pin.rnea(model, data, q[k], first[k], second[k])
+        torques[1:] -= torques[0]
+        self._driving, own = torques[1:] / weight, torques[..., :6]
         states = climber.states(q)
         turns, arms = states[:, :9].reshape(-1, 3, 3), states[:, 9:12] - self._center
         force, moment = (np.einsum("nij,cnj->cni", turns, part) for part in (own[..., :3], own[..., 3:]))

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import heapq
 import itertools
-from collections import Counter, defaultdict, deque
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -51,8 +51,10 @@ WEIGHT = 2.5
 NEAR = 1.0
 #: What a stretch of 1 costs [steps]
 DEAR = 6.0
-#: Other beginnings from which postures of refused moves are sought, once nothing else is left
+#: Other beginnings from which postures of refused moves are sought
 ATTEMPTS = 3
+#: What each of them costs more [steps]
+AGAIN = 16.0
 #: What a move costs more whose like could not be made, once [steps]
 LATE = 8.0
 #: Of the robot's length, and of directions: moves that differ by less are alike [1]
@@ -65,6 +67,8 @@ AT_START = 1e-4
 DRAWN = 1e2
 
 
+#: Moves from a stance, with what they promise to cost
+_Moves = Iterator[tuple[float, NDArray[np.int32]]]
 #: Moves of a limb: to a foothold, () before it, or all those from a stance with contacts, -1 after it
 LateMove = tuple[tuple[int, ...], int, int]
 
@@ -260,12 +264,13 @@ class StanceSearch:
         self._known: dict[bytes, _Node] = {}
         self._nearest = self.first
         self._count = itertools.count()
-        self._queue: list[tuple[float, int, _Node, Iterator[tuple[float, NDArray[np.int32]]], NDArray[np.int32]]] = []
-        self._again: deque[tuple[_Node, NDArray[np.int32], int]] = deque()
+        #: (cost, number, stance, moves from it that are dearer, contacts after the move, attempt)
+        self._queue = list[tuple[float, int, _Node, _Moves, NDArray[np.int32], int]]()
         self._late: set[LateMove] = set()
-        self._delayed: set[tuple[int, bytes]] = set()
-        #: Moves whose like was out of reach when it was looked at last
-        self._beyond: set[tuple[Any, ...]] = set()
+        #: By how much moves were put off [steps]
+        self._delays = dict[tuple[int, bytes], float]()
+        #: How often the like of a move was out of reach since one was not
+        self._misses = Counter[tuple[Any, ...]]()
         self._known_apart: dict[tuple[int, int], bytes] = {}
         self._down = np.asarray(self.world.numbers.down)
         #: Stances that are come to by a forbidden move, and other moves to known stances
@@ -294,14 +299,8 @@ class StanceSearch:
                 raise no_stances("goal", self._told_goal(), gap, "goal", self._distance(first))
             self._push(first, self._moves(first))
         most = self.options.moves + sum(self.tried.values())
-        while self._queue or self._again:
-            if self._queue:
-                cost, _, node, moves, after = heapq.heappop(self._queue)
-                attempt = 0
-            else:
-                # What was refused is looked at from other beginnings, once all else was
-                node, after, attempt = self._again.popleft()
-                cost, moves = node.cost, iter(())
+        while self._queue:
+            cost, _, node, moves, after, attempt = heapq.heappop(self._queue)
             if id(node) in self._removed:
                 continue
             self._push(node, moves)
@@ -311,8 +310,8 @@ class StanceSearch:
                 raise self._refusal("limit")
             if self._forbidden(node.contacts, after):
                 continue
-            if attempt == 0 and (self._comes_late(node, after) or self._put_off(node, after)):
-                self._push(node, iter([(cost + LATE, after)]))
+            if attempt == 0 and (delay := self._put_off(node, after)):
+                self._push(node, iter([(cost + delay, after)]))
                 continue
             if after.tobytes() in self._known:
                 self._other[after.tobytes()].append((cost, node, after))
@@ -323,7 +322,7 @@ class StanceSearch:
                 self._push(node, self._moves(node))
             if found is None:
                 if attempt < ATTEMPTS:
-                    self._again.append((node, after, attempt + 1))
+                    self._push(node, iter([(cost + AGAIN, after)]), attempt + 1)
                 continue
             self._known[after.tobytes()] = found
             self.seen = len(self._known)
@@ -334,10 +333,10 @@ class StanceSearch:
             self._push(found, self._moves(found))
         raise self._refusal("reach")
 
-    def _push(self, node: _Node, moves: Iterator[tuple[float, NDArray[np.int32]]]) -> None:
+    def _push(self, node: _Node, moves: _Moves, attempt: int = 0) -> None:
         """The next of the moves from a stance."""
         for cost, after in moves:
-            heapq.heappush(self._queue, (cost, next(self._count), node, moves, after))
+            heapq.heappush(self._queue, (cost, next(self._count), node, moves, after, attempt))
             return
 
     def forbid(self, before: Sequence[int], after: Sequence[int], late: Iterable[LateMove] = ()) -> None:
@@ -352,37 +351,37 @@ class StanceSearch:
         for key, node in self._known.items():
             if node.before is None:
                 continue
-            delayed = self._comes_late(node.before, node.contacts)
-            if delayed or id(node.before) in self._removed or self._forbidden(node.before.contacts, node.contacts):
+            delay = self._put_off(node.before, node.contacts) if self._is_late(node.before, node.contacts) else 0.0
+            if delay or id(node.before) in self._removed or self._forbidden(node.before.contacts, node.contacts):
                 self._removed[id(node)] = node
                 lost.append(key)
-                if delayed:
-                    self._push(node.before, iter([(node.cost + LATE, node.contacts)]))
+                if delay:
+                    self._push(node.before, iter([(node.cost + delay, node.contacts)]))
         for key in lost:
             del self._known[key]
         for key in lost:
             for cost, node, contacts in self._other.pop(key, ()):
                 self._push(node, iter([(cost, contacts)]))
 
-    def _comes_late(self, node: _Node, after: NDArray[np.int32]) -> bool:
-        """Whether a move is dearer than it looks; each is once."""
-        key = id(node), after.tobytes()
-        if not self._late or key in self._delayed:
+    def _is_late(self, node: _Node, after: NDArray[np.int32]) -> bool:
+        """Whether a move is dearer than it looks."""
+        if not self._late:
             return False
         before, there = self._rows(node.contacts), self._rows(after)
         moved = np.flatnonzero(node.contacts != after).tolist()
-        late = not self._late.isdisjoint(move for k in moved for move in (((), k, there[k]), (before, k, FREE_LIMB)))
-        if late:
-            self._delayed.add(key)
-        return late
+        return not self._late.isdisjoint(move for k in moved for move in (((), k, there[k]), (before, k, FREE_LIMB)))
 
-    def _put_off(self, node: _Node, after: NDArray[np.int32]) -> bool:
-        """Whether the like of a move was out of reach when it was looked at last; each is put off once."""
+    def _put_off(self, node: _Node, after: NDArray[np.int32]) -> float:
+        """What a move costs beyond what it was put off by so far: as one that is late, and for each time that its like
+        was out of reach since one was not [steps].
+        """
         key = id(node), after.tobytes()
-        if key in self._delayed or self._alike(node.contacts, after) not in self._beyond:
-            return False
-        self._delayed.add(key)
-        return True
+        due = LATE * (self._is_late(node, after) + self._misses[self._alike(node.contacts, after)])
+        more = due - self._delays.get(key, 0.0)
+        if more <= 0.0:
+            return 0.0
+        self._delays[key] = due
+        return more
 
     def _alike(self, contacts: NDArray[np.int32], after: NDArray[np.int32]) -> tuple[Any, ...]:
         """What moves are told apart by in how far limbs reach: which limbs move, and where they and those that stay are
@@ -426,8 +425,8 @@ class StanceSearch:
             how = PostureOutcome.NOT_BORNE
         self.tried[how] += 1
         if attempt == 0:
-            learn = self._beyond.add if how == PostureOutcome.NOT_REACHED else self._beyond.discard
-            learn(self._alike(node.contacts, after))
+            like = self._alike(node.contacts, after)
+            self._misses[like] = self._misses[like] + 1 if how == PostureOutcome.NOT_REACHED else 0
         if how != PostureOutcome.STANDS:
             return None
         return _Node(after, land, node.steps + 1, min(before, slack), node, cost, lift if moves else None)
@@ -439,7 +438,7 @@ class StanceSearch:
         q, least = self.world.q_of(state), self.options.margin - ROUNDING
         return self._balance.margin(self._rows(kept), q, motors=True, effort=self.options.effort) >= least
 
-    def _moves(self, node: _Node) -> Iterator[tuple[float, NDArray[np.int32]]]:
+    def _moves(self, node: _Node) -> _Moves:
         """Moves from a stance, with what they promise to cost, the least first; far ones come last."""
         held = np.array([self._far[limb, at] if at >= 0 else np.nan for limb, at in enumerate(node.contacts)])
         aloft = float(np.nanmean(held)) + IN_THE_AIR if np.isfinite(held).any() else IN_THE_AIR
@@ -449,7 +448,7 @@ class StanceSearch:
         left = total - each[out[:, 0]] + self._far[out[:, 0], out[:, 1]]
         cost = done + WEIGHT * (left + self._body_left(stretch[:, 1:])) + DEAR * stretch[:, 0]
 
-        def ordered(out: NDArray[np.int32], cost: Array) -> Iterator[tuple[float, NDArray[np.int32]]]:
+        def ordered(out: NDArray[np.int32], cost: Array) -> _Moves:
             for k in np.argsort(cost, kind="stable").tolist():
                 limb = int(out[k, 0])
                 if limb not in node.stuck:
@@ -457,7 +456,7 @@ class StanceSearch:
                     after[limb] = out[k, 1]
                     yield float(cost[k]), after
 
-        def singles() -> Iterator[tuple[float, NDArray[np.int32]]]:
+        def singles() -> _Moves:
             yield from ordered(out, cost)
             later, far = self.world.candidates(node.contacts, node.state, NEAR, np.inf, guesses=False)
             left = total - each[later[:, 0]] + self._far[later[:, 0], later[:, 1]] + self._body_left(far[:, 1:])

@@ -82,6 +82,7 @@ class PathTiming:
 
     Attributes:
         climber: whose joints' limits count. speeds: as given.
+        effort: share of the joints' efforts that motors give on the way, where something weighs [1]; inf: any torque.
 
     Raises:
         RangeError: a joint of a limb has no limit of velocity or acceleration.
@@ -89,6 +90,7 @@ class PathTiming:
 
     climber: Climber
     speeds: MotionSpeeds
+    effort: float = np.inf
 
     def __post_init__(self) -> None:
         limits = self.climber.robot.limits
@@ -145,7 +147,10 @@ class PathTiming:
             slower = loads.lacking(np.diff(speed**2) / (2.0 * np.diff(s)), speed**2)
             if slower <= NEARLY:
                 break
-        return speed / slower
+        speed = speed / slower
+        if self.effort < np.inf:
+            speed = speed / loads.overdriven(np.diff(speed**2) / (2.0 * np.diff(s)), speed**2, self.effort)
+        return speed
 
     def _squared(self, slopes: Array, velocity: Array) -> Array:
         """Bounds of (ds/dt)^2 of joints' velocities and of the body's speed and turn rate."""

@@ -71,12 +71,15 @@ class _LimbPair:
     middle: Array
 
 
-def find_body(tree: Skeleton, *, field: str = "skeleton", arms: bool = False, straight: float = 1.0) -> BodyPlan:
+def find_body(
+    tree: Skeleton, *, field: str = "skeleton", arms: bool = False, straight: float = 1.0, up: Array | None = None
+) -> BodyPlan:
     """The plan of a skeleton.
 
     Args:
         field: what a refusal names. arms: a single pair of limbs is arms, not legs.
         straight: cosine of the angle within which the line from right to left is taken for a coordinate axis.
+        up: the direction that is up unless limbs say another; None: limbs alone say it.
 
     Raises:
         BodyError: no pair of limbs.
@@ -84,7 +87,7 @@ def find_body(tree: Skeleton, *, field: str = "skeleton", arms: bool = False, st
     every = _pairs(tree)
     if not every:
         raise BodyError(field, ", ".join(tree.names[:8]), "no two chains of equal bones: there are no limbs to find")
-    up = _up(tree, every)
+    up = _up(tree, every, np.zeros(3) if up is None else up)
     # Legs, and where there are more limbs those that carry the shoulders
     pairs = sorted(every, key=lambda pair: float(pair.middle @ up))[:: max(len(every) - 1, 1)]
     if len(every) > 2:
@@ -100,9 +103,7 @@ def find_body(tree: Skeleton, *, field: str = "skeleton", arms: bool = False, st
     for kind, pair in zip(("leg", "arm"), pairs, strict=False):
         feet = kind == "leg" or not upright
         chains = [_lowest_branch(tree, chain, up) for chain in pair.chains] if feet else list(pair.chains)
-        apart = abs(float((tree.rest[chains[0][0]] - tree.rest[chains[1][0]]) @ left))
-        side = 0 if apart >= SHORT * pair.reach else -1
-        chains.sort(key=lambda chain: -float(tree.rest[chain[side]] @ left))
+        chains.sort(key=lambda chain: -float(tree.rest[list(chain)].mean(axis=0) @ left))
         kind = "arm" if arms and len(pairs) == 1 else kind
         limbs[f"left_{kind}"], limbs[f"right_{kind}"] = chains
     axes = np.stack([np.cross(left, up), left, up], axis=1)
@@ -111,29 +112,20 @@ def find_body(tree: Skeleton, *, field: str = "skeleton", arms: bool = False, st
 
 def longest_chain(tree: Skeleton, first: int) -> tuple[int, ...]:
     """Points from one to the end of the longest branch below it."""
-    children, reach, chain = tree.children, _reaches(tree), [first]
-    while children[here := chain[-1]]:
-        chain.append(max(children[here], key=lambda child: reach[child] + tree.length((here, child))))
-    return tuple(chain)
+    below = [longest_chain(tree, child) for child in tree.children[first]]
+    return (first, *max(below, key=lambda chain: tree.length((first, *chain)), default=()))
 
 
 def _lowest_branch(tree: Skeleton, chain: tuple[int, ...], up: Array) -> tuple[int, ...]:
-    """The branch of a leg that ends lowest, where that is well below the longest branch's end; else the longest."""
-    ends = [k for k in reversed(range(len(tree.names))) if chain[0] in ancestors(tree.parents, k)]
-    lowest = min(set(ends) - {*tree.parents}, key=lambda point: (float(tree.rest[point] @ up), -point))
-    if float((tree.rest[chain[-1]] - tree.rest[lowest]) @ up) > LOWER * tree.length(chain):
-        return tree.path(chain[0], lowest)
-    return chain
-
-
-def _reaches(tree: Skeleton) -> Array:
-    """Length of the longest branch below each point."""
-    reach = np.zeros(len(tree.names))
-    for point in range(len(tree.names) - 1, 0, -1):
-        parent = tree.parents[point]
-        if parent >= 0:
-            reach[parent] = max(reach[parent], reach[point] + tree.length((parent, point)))
-    return reach
+    """The branch of a leg that ends lowest, where that is well below the longest branch's end; else the longest. Of
+    branches that end at one place, as those of a closed loop do, the shortest carries the leg.
+    """
+    ends = {k for k in range(len(tree.names)) if chain[0] in ancestors(tree.parents, k)} - {*tree.parents}
+    end = min(ends, key=lambda point: (float(tree.rest[point] @ up), point))
+    if float((tree.rest[chain[-1]] - tree.rest[end]) @ up) <= LOWER * tree.length(chain):
+        end = chain[-1]
+    same = [k for k in sorted(ends) if np.linalg.norm(tree.rest[k] - tree.rest[end]) < SHORT * tree.length(chain)]
+    return min((tree.path(chain[0], k) for k in (end, *same)), key=tree.length)
 
 
 def _pairs(tree: Skeleton) -> list[_LimbPair]:
@@ -169,10 +161,13 @@ def _unlike(tree: Skeleton, a: tuple[int, ...], b: tuple[int, ...]) -> tuple[flo
     return bones + APART * tree.length((a[0], b[0])) / length + NAMED * sides, bones
 
 
-def _up(tree: Skeleton, pairs: Sequence[_LimbPair]) -> Array:
-    """The coordinate axis that is nearest to the direction from the limbs' ends to their beginnings."""
+def _up(tree: Skeleton, pairs: Sequence[_LimbPair], likely: Array) -> Array:
+    """The coordinate axis that is nearest to the direction from the limbs' ends to their beginnings, of which the
+    likely one counts as a limb: arms may point ahead.
+    """
     chains = np.array([(chain[0], chain[-1]) for pair in pairs for chain in pair.chains])
     rise = (tree.rest[chains[:, 0]] - tree.rest[chains[:, 1]]).sum(axis=0)
+    rise += likely * max(pair.reach for pair in pairs)
     axis = int(np.argmax(np.abs(rise)))
     return np.asarray(np.eye(3)[axis] * (np.sign(rise[axis]) or 1.0))
 
@@ -204,8 +199,7 @@ def _left(tree: Skeleton, pairs: Sequence[_LimbPair], across: Array, up: Array, 
     if upright and min(map(len, legs.chains)) >= 4:
         # Toes point forward
         for chain in legs.chains:
-            before, toe = np.diff(tree.rest[list(chain[-3:])], axis=0)
-            forward += toe + (before if abs(before @ up) < 0.5 * np.linalg.norm(before) else 0.0)
+            forward += tree.rest[chain[-1]] - tree.rest[chain[-2]]
     ahead = np.cross(across, up)
     vote = float(forward @ ahead)
     if abs(vote) < 0.2 * float(np.linalg.norm(forward)) or vote == 0.0:

@@ -107,10 +107,12 @@ def nearest_above(parents: Sequence[int], joint: int, there: Container[int]) -> 
 
 def intervals(marks: Marks) -> list[tuple[int, int]]:
     """First frame and the one after the last of every run of true."""
-    edges = np.flatnonzero(np.diff(np.asarray(marks, dtype=np.int8), prepend=0, append=0)).tolist()
+    between = np.zeros(len(marks) + 2, dtype=bool)
+    between[1:-1] = marks
+    edges = np.flatnonzero(between[1:] != between[:-1]).tolist()
     return list(zip(edges[::2], edges[1::2], strict=True))
 
 
-def listed(entries: Sequence[str], most: int, apart: str = ", ") -> str:
-    """The first entries in a line, with dots where there are more."""
-    return apart.join([*entries[:most], *(["..."] if len(entries) > most else [])])
+def listed(entries: Sequence[str]) -> str:
+    """The first eight entries in a line, with dots where there are more."""
+    return ", ".join([*entries[:8], *(["..."] if len(entries) > 8 else [])])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import os
 
 import numpy as np
@@ -9,7 +10,6 @@ import numpy as np
 from wbc import tasks
 from wbc.api import Controller, Stack
 from wbc.multibody import pin
-from wbc.retarget.clip import Array
 from wbc.retarget.correspondence import TRUNK, Correspondence
 from wbc.retarget.robot_body import with_frame
 from wbc.shapes import Convex, PlacedShape, Sphere
@@ -20,8 +20,8 @@ CHAIN_PARTS = ("base", "middle", "end", "tip")
 SAME_POINT = 1e-6
 #: The skeleton stands so far beside the robot, in sizes of its own
 SKELETON_ASIDE = 0.7
-#: Radius of a bone, as share of the skeleton's size
-BONE_RADIUS = 0.012
+#: Width of a bone, as share of the skeleton's size
+BONE_WIDTH = 0.02
 #: Between looks at what was dragged [s]
 EVERY = 0.02
 
@@ -68,15 +68,15 @@ class CorrespondenceEditor:
             ):
                 frames[f"{limb} {part}"], self._leads[f"{limb} {part}"] = frame, point
         tip = next(iter(body.limbs.values())).end
-        robot = robot.with_shapes({tip: [PlacedShape(Sphere(BONE_RADIUS * size), pin.SE3.Identity())]})
+        robot = robot.with_shapes({tip: [PlacedShape(Sphere(BONE_WIDTH * size), pin.SE3.Identity())]})
         stack = Stack(robot.with_self_pairs(()), dt=EVERY)
         if robot.base != "fixed":
             stack.add(tasks.Fixed((str(robot.model.names[1]),), acceleration=False), name="base")
         for item, frame in frames.items():
             stack.add(tasks.EndEffector(frame, "position"), name=item)
-        radius, parents = BONE_RADIUS * size, match.skeleton.parents
-        bones = [(self.points[joint], self.points[parent]) for joint, parent in enumerate(parents) if parent >= 0]
-        drawn = [_bone(a, b, radius) for a, b in bones if np.linalg.norm(b - a) > radius]
+        cube = BONE_WIDTH * size * (np.array(list(itertools.product((0.0, 1.0), repeat=3))) - 0.5)
+        bones = [(joint, parent) for joint, parent in enumerate(match.skeleton.parents) if parent >= 0]
+        drawn = [Convex((self.points[list(bone), None] + cube).reshape(-1, 3)) for bone in bones]
         stack.add(tasks.Obstacle(drawn, links=(tip,), pose=pin.SE3.Identity()), name="skeleton")
         self.controller: Controller = stack.compile()
         self.q, self._stopped = robot.neutral, True
@@ -86,36 +86,19 @@ class CorrespondenceEditor:
 
     def look(self, stopped: bool = False) -> bool:
         """Take over what was dragged since; whether anything was. Nothing is while the viewer is stopped."""
-        given: dict[str, object] = {}
-        limbs: dict[str, list[str]] = {}
-        names, free = self.match.skeleton.names, not (stopped or self._stopped)
+        free, changed = not (stopped or self._stopped), False
         self._stopped = stopped
         for item, point in self._leads.items():
             away = np.linalg.norm(self.points - np.asarray(self.controller[item].target), axis=1)
-            nearest = int(away.argmin())
-            if free and away[nearest] < away[point] - SAME_POINT:
-                self._leads[item] = nearest
-                limb, _, part = item.rpartition(" ")
-                if not limb:
-                    given[item] = names[nearest]
-                    continue
-                chain = limbs.setdefault(limb, [names[k] for k in self.match.limbs[limb].chain])
-                chain[CHAIN_PARTS.index(part)] = names[nearest]
+            if free and away.min() < away[point] - SAME_POINT:
+                self._leads[item], changed = int(away.argmin()), True
             self.controller[item].target = self.points[self._leads[item]]
         self.controller["skeleton"].pose = pin.SE3.Identity()
-        given["limbs"] = {limb: [self.match.limbs[limb].source, *chain] for limb, chain in limbs.items()}
-        if len(given) > 1 or limbs:
-            self.match = self.match.corrected(given)
+        if changed:
+            names = {item: self.match.skeleton.names[point] for item, point in self._leads.items()}
+            limbs = {limb: [own.source] for limb, own in self.match.limbs.items()}
+            for limb, row in limbs.items():
+                row += [names.pop(f"{limb} {part}") for part in CHAIN_PARTS]
+            self.match = self.match.corrected(names | {"limbs": limbs})
             self.match.save(self.file)
-            return True
-        return False
-
-
-def _bone(a: Array, b: Array, radius: float) -> Convex:
-    """What is drawn between two points."""
-    along = b - a
-    side = np.cross(along, np.eye(3)[np.abs(along).argmin()])
-    side *= radius / np.linalg.norm(side)
-    other = np.cross(along, side) / np.linalg.norm(along)
-    wide = a + 0.2 * along
-    return Convex(np.array([a, wide + side, wide + other, wide - side, wide - other, b]))
+        return changed

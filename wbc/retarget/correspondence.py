@@ -16,7 +16,7 @@ from wbc.extras import require
 from wbc.retarget.body import LIMBS, BodyError, BodyPlan, find_body
 from wbc.retarget.clip import Array, Skeleton
 from wbc.retarget.hands import FINGERS, find_hand, handedness
-from wbc.retarget.robot_body import RobotBody, RobotLimb
+from wbc.retarget.robot_body import RobotBody
 from wbc.retarget.words import ARM_WORDS, side_of
 
 #: How much a limb's longer bone counts against its shorter one when knee and elbow are sought
@@ -160,7 +160,11 @@ def correspondence(body: RobotBody, skeleton: Skeleton, *, all_fours: bool = Fal
     robot, some = body.robot, ", ".join(skeleton.names[:8])
     if body.is_hand:
         plan = find_hand(skeleton, side_of(robot.name))
-        limbs = {name: _finger(name, chain, body.limbs.get(name)) for name, chain in plan.limbs.items()}
+        limbs = {}
+        for name, chain in plan.limbs.items():
+            # What leads a finger of two bones goes from its middle to the tip
+            three = name not in body.limbs or body.limbs[name].wrist
+            limbs[name] = LimbMatch(name, chain[0], chain[1], chain[2] if three else chain[-1], chain[-1])
     else:
         plan = find_body(skeleton)
         limbs = {name: _hinges(plan, chain, name, skeleton.ends) for name, chain in plan.limbs.items()}
@@ -191,12 +195,6 @@ def correspondence(body: RobotBody, skeleton: Skeleton, *, all_fours: bool = Fal
         body, skeleton, pairs, plan.pelvis, plan.chest, head, plan.axes, plan.upright,
         _scale(body, skeleton.rest, pairs, plan), all_fours, mirrored, tuple(notes),
     )  # fmt: skip
-
-
-def _finger(name: str, chain: tuple[int, ...], limb: RobotLimb | None) -> LimbMatch:
-    """Knuckles and tip of a finger; one that leads a finger of two bones goes from its middle to the tip."""
-    base, middle, end = chain[:3] if limb is None or limb.wrist else (*chain[:2], chain[-1])
-    return LimbMatch(name, base, middle, end, chain[-1])
 
 
 def _hinges(plan: BodyPlan, chain: tuple[int, ...], name: str, ends: tuple[bool, ...]) -> LimbMatch:

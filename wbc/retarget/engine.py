@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,6 +74,8 @@ LYING = 1e2
 PUSHED = 0.02
 #: Ticks that bring the robot to the first frame
 SETTLING = 80
+#: How far contacts that are held at first may lead the trunk from where it is without them [m]
+LED_AWAY = 0.1
 #: The first frame is reached when no joint moves faster [rad/s]
 SETTLED = 1e-3
 
@@ -97,14 +99,8 @@ class StillContact(tasks.Hold):
     exact: ClassVar[bool] = True
 
 
-@dataclass(frozen=True)
-class _PlanFollower:
-    """An item of the stack that follows a plan.
-
-    Attributes:
-        place, turn: names of the position and the rotation that it follows; "" where it follows none.
-        stands: it is a contact, which is at the next target a tick later.
-    """
+class _PlanFollower(NamedTuple):
+    """An item that follows a position and a rotation of the plan, "" where none; at the next ones, if it stands."""
 
     item: str
     place: str = ""
@@ -300,14 +296,21 @@ class Engine:
             q[3:7] /= np.linalg.norm(q[3:7])
         first, second = (self.rows(places[[k]], turns[[k]])[0] for k in (0, min(1, len(places) - 1)))
         self._hold(dict.fromkeys(self._limbs, ContactGrip.FREE))
-        self._gains.write(np.full(len(self._own_gains), GAIN / self.dt))
+        fast = np.full(len(self._own_gains), GAIN / self.dt)
+        self._gains.write(fast)
         q, _ = self._settled(q, first, SETTLING)
-        # What is held jumps to its place, so it is brought there before; what cannot be there is not held
+        # What is held jumps to its place, so it is brought there before; what cannot be there, or leads the trunk away
+        # as it goes there, is not held
         self._hold(held)
         placed, served = self._settled(q, first, SETTLING // 4)
+        served &= not self._holds or float(np.linalg.norm(placed[:3] - q[:3])) < LED_AWAY
         if not served:
+            # With gains of their own tasks push feet less into the ground
             self._hold(dict.fromkeys(self._limbs, ContactGrip.FREE))
-        q = placed if served else q
+            self._gains.write(self._own_gains)
+            placed, _ = self._settled(q, first, SETTLING // 4)
+            self._gains.write(fast)
+        q = placed
         after, _ = self._settled(q, second, SETTLING // 4)
         self._gains.write(self._own_gains)
         v = pin.difference(robot.model, q, after) / self.dt

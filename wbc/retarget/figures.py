@@ -68,26 +68,19 @@ def motion_figures(
     turns, places = frame_poses(robot, names, q)
     poses = {name: (turns[:, k], places[:, k]) for k, name in enumerate(names)}
     slides: dict[str, float] = {}
+    on = {name: model.frames[model.getFrameId(name)].parentJoint for name in names}
     for foot in feet:
-        turn, place = poses[foot]
-        sole = np.zeros((1, 3)) if foot in balls else _own_points(robot, foot, surfaces)
-        slides[foot] = _slide(sole @ np.swapaxes(turn, 1, 2) + place[:, None], np.asarray(stance[foot]))
+        # Of a sole all that its joint moves
+        own = [link for link in surfaces if on[link] == on[foot] and foot not in balls]
+        points = {link: surfaces[link] for link in own} or {foot: np.zeros((1, 3))}
+        tracks = [at @ np.swapaxes(poses[k][0], 1, 2) + poses[k][1][:, None] for k, at in points.items()]
+        slides[foot] = _slide(np.concatenate(tracks, axis=1), np.asarray(stance[foot]))
     out |= {"slide": max(slides.values(), default=0.0), "slides": slides}
     if ground is not None and surfaces:
         heights = [(poses[k][0][:, 2] @ own.T).min(axis=1) + poses[k][1][:, 2] for k, own in surfaces.items()]
         depth = np.maximum(0.0, ground - np.min(heights, axis=0))
         out |= {"penetration": float(depth.max()), "penetration_frames": int((depth > 1e-3).sum())}
     return out
-
-
-def _own_points(robot: Robot, foot: str, surfaces: Mapping[str, Array]) -> Array:
-    """Points of what the foot's joint moves, in the foot's frame; the frame's origin where it has no surface [n, 3]."""
-    frames = {name: robot.model.frames[robot.model.getFrameId(name)] for name in (foot, *surfaces)}
-    joint, placement = frames[foot].parentJoint, frames[foot].placement
-    own = [link for link in surfaces if frames[link].parentJoint == joint]
-    places = [placement.actInv(frames[link].placement) for link in own]
-    moved = [surfaces[link] @ at.rotation.T + at.translation for link, at in zip(own, places, strict=True)]
-    return np.concatenate(moved or [np.zeros((1, 3))])
 
 
 def _slide(track: Array, stands: Marks) -> float:

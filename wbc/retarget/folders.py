@@ -8,7 +8,6 @@ import json
 import multiprocessing
 import os
 import pathlib
-import shutil
 import signal
 import time
 from collections import Counter
@@ -71,13 +70,8 @@ class ClipJob:
         return isinstance(done, dict) and done.get("asked") == self.asked
 
 
-@dataclass(frozen=True)
-class ClipDone:
-    """What came of a clip: figures of its report, or the reason why there are none."""
-
-    job: ClipJob
-    figures: Mapping[str, Any]
-    reason: str = ""
+#: A clip, figures of its report, and the reason why there are none; "" where there are
+ClipDone = tuple[ClipJob, dict[str, Any], str]
 
 
 def find_clips(paths: Sequence[str | os.PathLike[str]]) -> list[tuple[pathlib.Path, pathlib.Path]]:
@@ -123,8 +117,8 @@ def retarget_clips(jobs: Iterable[ClipJob], workers: int = 1, client: Any = None
             for future in as_completed(waiting):
                 # A process that was killed is a reason too
                 error = future.exception()
-                failed = ClipDone(waiting[future], {}, f"{type(error).__name__}: {error}")
-                yield future.result() if error is None else failed
+                failed = f"{type(error).__name__}: {error}"
+                yield future.result() if error is None else (waiting[future], {}, failed)
         except BaseException:
             # Those that are busy would be waited for, and are forgotten by a pool that was shut down
             busy = list((getattr(pool, "_processes", None) or {}).values())
@@ -137,25 +131,28 @@ def retarget_clips(jobs: Iterable[ClipJob], workers: int = 1, client: Any = None
 
 
 def retarget_job(job: ClipJob) -> ClipDone:
-    """Retarget one clip and write its folder, whole or not at all."""
+    """Retarget one clip and write its folder, the report last."""
     try:
         clip = load_clip(job.clip, **job.loading)
         start = time.perf_counter()
-        known = retargeter_of.cache_info().hits
         retargeter = retargeter_of(job.robot, tuple(sorted(job.options.items())), job.correspondence)
-        first = retargeter_of.cache_info().hits == known
         motion = retargeter.run(clip)
         seconds = time.perf_counter() - start
-        with _fresh(job.folder) as fresh:
-            figures = write_report(motion, fresh, job.formats, seconds=seconds, film=job.film, support=job.support)
-            retargeter.correspondence(clip.skeleton).save(fresh / "correspondence.yaml")
-            figures |= {"asked": job.asked, "stack_made": first}
-            (fresh / DONE).write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
-        return ClipDone(job, figures)
+        job.folder.mkdir(parents=True, exist_ok=True)
+        # While it is not there the folder is not done
+        (job.folder / DONE).unlink(missing_ok=True)
+        retargeter.correspondence(clip.skeleton).save(job.folder / "correspondence.yaml")
+        more: dict[str, Any] = {"asked": job.asked}
+        if job.support and motion.robot.base != "fixed":
+            from wbc.retarget.holding_forces import held
+
+            at_rest = held(motion)
+            more |= {"held_at_rest": at_rest.share, "support": str(at_rest)}
+        return job, write_report(motion, job.folder, job.formats, seconds=seconds, film=job.film, more=more), ""
     except WbcError as error:
-        return ClipDone(job, {}, str(error))
+        return job, {}, str(error)
     except OSError as error:
-        return ClipDone(job, {}, f"{job.folder}: {error}")
+        return job, {}, f"{job.folder}: {error}"
 
 
 @functools.lru_cache(maxsize=4)
@@ -168,27 +165,8 @@ def retargeter_of(robot: str, options: tuple[tuple[str, Any], ...], file: pathli
     from wbc.retarget.robot_body import RestPose, hand_plan
 
     own, given = robots.load(robot), RetargetOptions(**dict(options))
-    stands = own.base == "floating" or hand_plan(RestPose(own, {})) is not None
-    try:
-        walks = own if stands else robots.load(robot, base="floating")
-        return Retargeter(walks, None, given, correspondence=file)
-    except BodyError:
-        if stands:
-            raise
-        # Arms without legs stand where they are
-        return Retargeter(own, None, given, correspondence=file)
-
-
-@contextlib.contextmanager
-def _fresh(folder: pathlib.Path) -> Iterator[pathlib.Path]:
-    """A folder beside the one that is written, whose files move there at the end, the report last."""
-    fresh = folder / ".writing"
-    shutil.rmtree(fresh, ignore_errors=True)
-    fresh.mkdir(parents=True)
-    try:
-        yield fresh
-        (folder / DONE).unlink(missing_ok=True)
-        for file in sorted(fresh.iterdir(), key=lambda file: file.name == DONE):
-            file.replace(folder / file.name)
-    finally:
-        shutil.rmtree(fresh, ignore_errors=True)
+    if own.base != "floating" and hand_plan(RestPose(own, {})) is None:
+        with contextlib.suppress(BodyError):
+            return Retargeter(robots.load(robot, base="floating"), None, given, correspondence=file)
+    # Hands, and arms without legs, stand where they are
+    return Retargeter(own, None, given, correspondence=file)

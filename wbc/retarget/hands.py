@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 
 from wbc.retarget.body import BodyError, BodyPlan, longest_chain
@@ -13,8 +15,6 @@ FINGERS = {
     "index": {"index", "ff", "forefinger"}, "thumb": {"thumb", "th"}, "middle": {"middle", "mid", "mf"},
     "ring": {"ring", "rf"}, "little": {"little", "pinky", "lf"},
 }  # fmt: skip
-#: Fewest fingers of a hand: a thumb and two
-FEWEST = 3
 #: Joints nearer to each other than this share of their finger are one knuckle
 KNUCKLE = 0.05
 
@@ -31,15 +31,12 @@ def find_hand(tree: Skeleton, side: int = 0) -> BodyPlan:
     Raises:
         BodyError: no point carries a thumb and two fingers.
     """
-    branches = [[_knuckles(tree, longest_chain(tree, child)) for child in own] for own in tree.children]
-    hands = [[chain for chain in own if len(chain) > 2] for own in branches]
-
-    def rank(palm: int) -> int:
-        return len(hands[palm]) + (side * sum(side_of(tree.names[chain[-1]]) for chain in hands[palm]) > 0)
-
-    palm = max(range(len(hands)), key=rank)
+    chains = [[_knuckles(tree, longest_chain(tree, child)) for child in own] for own in tree.children]
+    hands = [[chain for chain in own if len(chain) > 2] for own in chains]
+    sides = [sum(side_of(tree.names[chain[-1]]) for chain in own) for own in hands]
+    palm = max(range(len(hands)), key=lambda point: len(hands[point]) + (side * sides[point] > 0))
     found = hands[palm]
-    if len(found) < FEWEST or tree.said(found) & LEG_WORDS:
+    if len(found) < 3 or tree.said(found) & LEG_WORDS:
         raise BodyError("skeleton", ", ".join(tree.names[:8]), "no hand: no point carries a thumb and two fingers")
     said = {name: [k for k, chain in enumerate(found) if own & tree.said([chain])] for name, own in FINGERS.items()}
     if sorted(k for own in said.values() for k in own) == list(range(len(found))):
@@ -77,9 +74,5 @@ def handedness(plan: BodyPlan, points: Array) -> float:
 def _knuckles(tree: Skeleton, chain: tuple[int, ...]) -> tuple[int, ...]:
     """The last points of a finger, at most four; of several at one place the last one that turns it."""
     apart = KNUCKLE * tree.length(chain)
-    kept = [
-        point
-        for point, after in zip(chain, (*chain[1:], -1), strict=True)
-        if after < 0 or tree.length((point, after)) > apart
-    ]
-    return tuple(kept[-4:])
+    kept = [point for point, after in itertools.pairwise(chain) if tree.length((point, after)) > apart]
+    return (*kept, chain[-1])[-4:]

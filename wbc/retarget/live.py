@@ -20,10 +20,12 @@ from wbc.retarget.plan import (
     MotionPlan,
     in_the_air,
     logarithms,
+    lowered,
     lowering,
     minimum_jerk,
     raised,
     standing_place,
+    with_ankles,
 )
 from wbc.retarget.stances import FAST, HAND_HEIGHT, LEVEL, SLOW
 from wbc.rotations import exponential
@@ -110,7 +112,7 @@ class LiveRetargeter:
         for name, match in self._match.limbs.items():
             ends = points[[match.end, match.tip]]
             limb = self._limbs.setdefault(name, _LiveLimb(ends))
-            speed = float(np.sqrt(((ends - limb.ends) ** 2).sum(axis=1).max())) * self.rate
+            speed = float(((ends - limb.ends) ** 2).sum(axis=1).max()) ** 0.5 * self.rate
             limb.speed += share * (speed - limb.speed)
             limb.ends = ends
             limb.slow = limb.speed < (FAST if limb.slow else SLOW) * self._leg
@@ -125,20 +127,20 @@ class LiveRetargeter:
     def _plan(self, places: Places) -> MotionPlan:
         """Targets of this frame, as a plan of one tick."""
         body = self._match.body
-        limbs = {name: self._limb(name, limb) for name, limb in places.limbs.items()}
-        need = float(lowering(body, places.pelvis, places.turn, limbs, 1.0 / self.rate)[0])
-        self._low = max(need, self._low - RISE / self.rate)
-        pelvis = places.pelvis - np.array([0.0, 0.0, self._low])
-        return MotionPlan(pelvis, places.turn, places.chest, places.head, limbs, self._engine.dt)
+        eased = with_ankles(body, places.limbs, places.turn)
+        limbs = {name: self._limb(name, limb, places.turn) for name, limb in eased.items()}
+        plan = MotionPlan(places.pelvis, places.turn, places.chest, places.head, limbs, self._engine.dt)
+        self._low = max(float(lowering(body, plan)[0]), self._low - RISE / self.rate)
+        return lowered(body, plan, np.array([self._low]))
 
-    def _limb(self, name: str, limb: LimbPlaces) -> LimbPlan:
+    def _limb(self, name: str, limb: LimbPlaces, turn: Array) -> LimbPlan:
         """A limb's target of this frame: on its way to the place where it stands, there, or on its way from it."""
         robot, state = self._match.body.limbs[name], self._limbs[name]
         if self._match.body.robot.base == "fixed":
             return in_the_air(limb)
         stands = state.stands
         if stands and state.share >= 1.0:
-            state.place, state.heading = standing_place(robot, limb, 0, 1)
+            state.place, state.heading = standing_place(robot, limb, turn, 0, 1)
         step = 1.0 / (BLEND * self.rate)
         state.share = max(state.share - step, 0.0) if stands else min(state.share + step, 1.0)
         flat = limb.rotation is not None and robot.contact == "flat"
@@ -154,7 +156,7 @@ class LiveRetargeter:
                 rotation = heading @ exponential(share * logarithms(heading.T @ rotation))
         held = np.array([stands and state.share * BLEND <= BEFORE])
         lies = np.array([not self._match.body.is_foot(name) and bool(state.place[2] <= robot.radius)])
-        return LimbPlan(limb.middle, limb.wrist, end, rotation, held, held, lies)
+        return LimbPlan(limb.base, limb.middle, limb.wrist, end, rotation, held, held, lies)
 
 
 def _between(last: tuple[Array, Array], now: tuple[Array, Array], every: int) -> tuple[Array, Array]:

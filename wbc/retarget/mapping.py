@@ -29,10 +29,12 @@ class LimbPlaces:
     """Targets of a limb.
 
     Attributes:
-        middle, wrist, end: positions of knee, ankle and contact frame, or elbow, wrist and hand [frames, 3] [m].
+        base, middle, wrist, end: positions of hip, knee, ankle and contact frame, or shoulder, elbow, wrist and hand
+            [frames, 3] [m].
         rotation: of the foot's or hand's frame [frames, 3, 3]; None where the skeleton does not say it.
     """
 
+    base: Array
     middle: Array
     wrist: Array
     end: Array
@@ -108,10 +110,12 @@ class Mapper:
         self._heights: dict[str, float] = {}
         #: from where the skeleton's foot would be to where the robot's is, both at rest, in the body's axes [m]
         self._shifts: dict[str, Array] = {}
-        #: directions of each limb's bones at rest, where a bone has no length [3, 3]
-        self._still: dict[str, Array] = {}
         #: of the robot's limbs: base to middle, middle to wrist, wrist to contact [m]
         self._lengths: dict[str, Array] = {}
+        #: points of all limbs, from base to tip; directions of their bones at rest, where one has no length
+        self._chains = np.array([one.chain for one in match.limbs.values()])
+        bones = np.diff(rest[self._chains], axis=1)
+        self._still = bones / np.maximum(np.linalg.norm(bones, axis=2, keepdims=True), 1e-9)
         for name, limb in body.limbs.items():
             self._bases[name] = (limb.base - (waist if self._from_chest(name) else body.places[0])) @ axes
             over = float((limb.places[2] - limb.places[3]) @ axes[:, 2])
@@ -122,8 +126,6 @@ class Mapper:
             if body.plan.upright:
                 foot[0], end[0] = ((limb.base - body.places[0]) @ axes)[0], ((rest[one.base] - hips) @ match.axes)[0]
             self._shifts[name] = np.asarray(foot - match.scale * end)
-            bones = np.diff(rest[list(one.chain)], axis=0)
-            self._still[name] = bones / np.maximum(np.linalg.norm(bones, axis=1, keepdims=True), 1e-9)
             self._lengths[name] = np.linalg.norm(np.diff(limb.places, axis=0), axis=1)
 
     def _from_chest(self, name: str) -> bool:
@@ -166,27 +168,27 @@ class Mapper:
             lift = np.array([0.0, 0.0, self._heights.get("left_leg", 0.0)])
             place = match.scale * (hips - np.array([0.0, 0.0, ground])) + lift
         head = turns[:, match.head] @ axes if turns is not None and match.head >= 0 and body.head else None
-        place[:, 2] += self._rise(points, place, pelvis)
+        ways = np.swapaxes(points[:, self._chains[:, 1:]] - points[:, self._chains[:, :-1]], 0, 1)
+        bones = dict(zip(match.limbs, normalised(ways, self._still[:, None]), strict=True))
+        place[:, 2] += self._rise(bones, place, pelvis)
         trunk = Places(place, pelvis, chest, head, {})
-        return replace(trunk, limbs={name: self._limb(name, points, turns, trunk, ankle) for name in match.limbs})
+        limbs = {name: self._limb(name, points, bones[name], turns, trunk, ankle) for name in match.limbs}
+        return replace(trunk, limbs=limbs)
 
-    def _rise(self, points: Array, place: Array, pelvis: Array) -> Array:
+    def _rise(self, bones: Mapping[str, Array], place: Array, pelvis: Array) -> Array:
         """How much the trunk must be higher so that knees lie on the ground and not in it [frames] [m]."""
         rise = np.zeros(len(place))
-        for name, match in self.match.limbs.items() if self._lies else ():
+        for name in bones if self._lies else ():
             if name.endswith("leg"):
-                bones = normalised(points[:, match.middle] - points[:, match.base], self._still[name][0])
-                knees = place[:, 2] + pelvis[:, 2] @ self._bases[name] + self._lengths[name][0] * bones[:, 2]
+                knees = place[:, 2] + pelvis[:, 2] @ self._bases[name] + self._lengths[name][0] * bones[name][:, 0, 2]
                 rise = np.maximum(rise, lift(knees - self.match.body.limbs[name].thickness[0]))
         return rise
 
     def _limb(
-        self, name: str, points: Array, turns: Array | None, trunk: Places, ankle: dict[str, float]
+        self, name: str, points: Array, bones: Array, turns: Array | None, trunk: Places, ankle: dict[str, float]
     ) -> LimbPlaces:
-        """Targets of a limb."""
+        """Targets of a limb, of the directions of its three bones [frames, 3, 3]."""
         match, limb = self.match.limbs[name], self.match.body.limbs[name]
-        chain = points[:, list(match.chain)]
-        bones = normalised(chain[:, 1:] - chain[:, :-1], self._still[name])
         if match.tip == match.end:
             bones[:, 2] = bones[:, 1]
         base = trunk.pelvis + trunk.turn @ self._bases[name]
@@ -200,13 +202,14 @@ class Mapper:
             middle = _next_joint(base, upper * bones[:, 0], lie[0], trunk.heading)
             wrist = _next_joint(middle, lower * bones[:, 1], lie[1], trunk.heading)
             end = _next_joint(wrist, hand * bones[:, 2], lie[2], trunk.heading)
-            return LimbPlaces(middle, wrist, end, rotation if turns is not None else None)
+            return LimbPlaces(base, middle, wrist, end, rotation if turns is not None else None)
         height = np.array([0.0, 0.0, self._heights[name]])
         wrist = self.match.scale * (points[:, match.end] - np.array([0.0, 0.0, ankle[match.source]])) + height
         wrist[:, :2] += (trunk.heading @ self._shifts[name])[:, :2]
         if limb.contact != "flat":
-            return LimbPlaces(middle, wrist, wrist, None)
-        return LimbPlaces(middle, wrist, wrist + (-height if rotation is None else rotation @ -height), rotation)
+            return LimbPlaces(base, middle, wrist, wrist, None)
+        end = wrist + (-height if rotation is None else rotation @ -height)
+        return LimbPlaces(base, middle, wrist, end, rotation)
 
     def _rotation(
         self, match: LimbMatch, points: Array, turns: Array | None, trunk: Places, foot: bool
@@ -229,18 +232,20 @@ class Mapper:
 
 def _next_joint(start: Array, bones: Array, thickness: float, headings: Array) -> Array:
     """Where bones [frames, 3] [m] end; those that would end nearer to the ground than a thickness [m] are turned."""
-    end = start + bones
+    end: Array = start + bones
     heights = end[:, 2] - thickness
     if not (heights < FAR_ABOVE * CLEAR).any():
         return end
-    lengths = np.linalg.norm(bones, axis=1)
-    rise = np.clip(bones[:, 2] + lift(heights), -lengths, lengths)
+    lengths = np.sqrt((bones * bones).sum(axis=1))
+    rise = np.minimum(np.maximum(bones[:, 2] + lift(heights), -lengths), lengths)
     # The bone goes out level as far as its length says, ahead where it stood upright
     way = bones[:, :2] + AHEAD_SHARE * lengths[:, None] * headings[:, :2, 0]
-    way /= np.maximum(np.linalg.norm(way, axis=1), SHORT)[:, None]
-    along, more = np.abs(np.sum(bones[:, :2] * way, axis=1)), bones[:, 2] ** 2 - rise**2
+    way /= np.maximum(np.sqrt((way * way).sum(axis=1, keepdims=True)), SHORT)
+    along, more = np.abs((bones[:, :2] * way).sum(axis=1)), bones[:, 2] ** 2 - rise**2
     out = more / np.maximum(along + np.sqrt(np.maximum(along**2 + more, 0.0)), SHORT)
-    return np.asarray(start + np.column_stack([bones[:, :2] + out[:, None] * way, rise]))
+    end[:, :2] += out[:, None] * way
+    end[:, 2] = start[:, 2] + rise
+    return end
 
 
 def _headings(rotations: Array) -> Array:

@@ -7,7 +7,6 @@ import os
 import pathlib
 import pickle
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
 
@@ -34,46 +33,28 @@ MOTION_FORMATS = {
 }  # fmt: skip
 
 
-@dataclass(frozen=True)
-class JointColumns:
-    """A motion in numbers that need no model.
+def joint_columns(motion: Retargeted, joints: Sequence[str] | None = None) -> tuple[tuple[str, ...], Array]:
+    """A motion in numbers that need no model: names of joints, and root and joints side by side [frames, 7 + joints].
 
-    Attributes:
-        root: position [m] and quaternion x, y, z, w of the base in the world [frames, 7].
-        names: of the joints' degrees of freedom, in the robot's order.
-        positions: of them [frames, joints] [rad, m]; a joint that turns without end by its angle, a ball joint by its
-            rotation vector.
+    The root is the base's position [m] and quaternion x, y, z, w in the world; of joints [rad, m] one that turns
+    without end has its angle, a ball joint its rotation vector.
+
+    Args:
+        joints: their order, or fewer of them; default: the robot's degrees of freedom.
+
+    Raises:
+        UnknownNameError: no such joint.
     """
-
-    root: Array
-    names: tuple[str, ...]
-    positions: Array
-
-    @property
-    def table(self) -> Array:
-        """Root and joints side by side [frames, 7 + joints]."""
-        return np.column_stack((self.root, self.positions))
-
-    @classmethod
-    def of(cls, motion: Retargeted) -> JointColumns:
-        """Those of a motion."""
-        robot, q = motion.robot, validation.ordinary_array("motion.q", motion.q)
-        model, first = robot.model, robot.base_nv
-        root = q[:, :7] if first else np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (len(q), 1))
-        places = robot.position_index[first:]
-        turned = np.array([pin.difference(model, pin.neutral(model), row) for row in q])[:, first:]
-        endless = [column - first for column, count in zip(model.idx_vs, model.nqs, strict=True) if count == 2]
-        turned[:, endless] = np.unwrap(turned[:, endless], axis=0)
-        return cls(root, robot.dof_names[first:], np.where(places >= 0, q[:, places], turned))
-
-    def in_order(self, joints: Sequence[str]) -> JointColumns:
-        """The same with joints in another order, or fewer.
-
-        Raises:
-            UnknownNameError: no such joint.
-        """
-        numbers = [self.names.index(validation.one_of("joints", name, self.names)) for name in joints]
-        return replace(self, names=tuple(self.names[k] for k in numbers), positions=self.positions[:, numbers])
+    robot, q = motion.robot, validation.ordinary_array("motion.q", motion.q)
+    model, first = robot.model, robot.base_nv
+    root = q[:, :7] if first else np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (len(q), 1))
+    names, places = robot.dof_names[first:], robot.position_index[first:]
+    turned = np.array([pin.difference(model, pin.neutral(model), row) for row in q])[:, first:]
+    endless = [column - first for column, count in zip(model.idx_vs, model.nqs, strict=True) if count == 2]
+    turned[:, endless] = np.unwrap(turned[:, endless], axis=0)
+    positions = np.where(places >= 0, q[:, places], turned)
+    chosen = names if joints is None else tuple(validation.one_of("joints", name, names) for name in joints)
+    return chosen, np.column_stack((root, positions[:, [names.index(name) for name in chosen]]))
 
 
 def write_motion(
@@ -105,22 +86,28 @@ def write_motion(
     validation.one_of("format", kind, MOTION_FORMATS)
     path = validation.file_path("file", file)
     path = path.with_name(path.stem + MOTION_FORMATS[kind])
-    columns = JointColumns.of(motion) if joints is None else JointColumns.of(motion).in_order(joints)
+    names, table = joint_columns(motion, joints)
     if kind == "log":
         return wbc.log.save(log_of(motion), path.parent, "npz", path.stem)
+    parts: dict[str, Any] = {"root_pos": table[:, :3], "root_rot": table[:, 3:7], "dof_pos": table[:, 7:]}
+    rate, stance = motion.rate, {f"stance.{limb}": np.asarray(stands) for limb, stands in motion.stance.items()}
     with validation.replacing("file", path, ClipFileError) as fresh:
         path.parent.mkdir(parents=True, exist_ok=True)
         if kind == "csv-plain":
-            np.savetxt(fresh, columns.table, fmt="%.9g", delimiter=",")
+            np.savetxt(fresh, table, fmt="%.9g", delimiter=",")
         elif kind == "keyframes":
             fresh.write_text(_keyframes(motion, model), encoding="utf-8")
         elif kind == "csv":
+            rows = [["time", *ROOT, *names], *np.column_stack((motion.time, table)).tolist()]
             with fresh.open("w", newline="", encoding="utf-8") as stream:
-                writer, table = csv.writer(stream), np.column_stack((motion.time, columns.table))
-                writer.writerow(["time", *ROOT, *columns.names])
-                writer.writerows([[repr(number) for number in row] for row in table.tolist()])
+                csv.writer(stream).writerows(rows)
+        elif kind == "gmr":
+            parts |= {"fps": round(rate) if abs(round(rate) - rate) < 1e-6 else rate, "joint_names": list(names)}
+            fresh.write_bytes(pickle.dumps(parts | dict.fromkeys(("local_body_pos", "link_body_list"))))
         else:
-            _write_arrays(motion, columns, fresh, kind)
+            parts |= {"q": motion.q, "time": motion.time, "rate": rate, "robot": motion.robot.name, **stance}
+            with fresh.open("wb") as stream:
+                np.savez_compressed(stream, allow_pickle=False, joint_names=names, **parts)
     return path
 
 
@@ -134,21 +121,6 @@ def log_of(motion: Retargeted) -> Log:
     columns |= {f"stance.{limb}": stands for limb, stands in motion.stance.items()}
     units |= {f"stance.{limb}": "" for limb in motion.stance}
     return Log(columns, units, {"robot": robot.name, "rate": motion.rate, "kind": "retargeted"})
-
-
-def _write_arrays(motion: Retargeted, columns: JointColumns, file: pathlib.Path, kind: str) -> None:
-    """Npz, or GMR's pickle."""
-    root, rate, names = columns.root.copy(), motion.rate, columns.names
-    parts: dict[str, Any] = {"root_pos": root[:, :3], "root_rot": root[:, 3:], "dof_pos": columns.positions}
-    with file.open("wb") as stream:
-        if kind == "gmr":
-            parts["fps"] = round(rate) if abs(round(rate) - rate) < 1e-6 else rate
-            parts |= {"local_body_pos": None, "link_body_list": None, "joint_names": list(names)}
-            pickle.dump(parts, stream)
-            return
-        parts |= {f"stance.{limb}": np.asarray(stands) for limb, stands in motion.stance.items()}
-        parts |= {"q": motion.q, "time": motion.time, "rate": rate, "robot": motion.robot.name, "joint_names": names}
-        np.savez_compressed(stream, allow_pickle=False, **parts)
 
 
 def _keyframes(motion: Retargeted, model: mujoco.MjModel | None) -> str:
@@ -188,17 +160,16 @@ def write_lerobot(
     words = ["retargeted motion"] * len(motions) if tasks is None else list(validation.strings("tasks", tasks))
     if len(words) != len(motions):
         raise ShapeError("tasks", words, f"expected {len(motions)}, one a motion")
-    columns = [JointColumns.of(motion) for motion in motions]
+    columns = [joint_columns(motion) for motion in motions]
     for number, motion in enumerate(motions):
-        if columns[number].names != columns[0].names or abs(motion.rate - motions[0].rate) > 1e-6:
+        if columns[number][0] != columns[0][0] or abs(motion.rate - motions[0].rate) > 1e-6:
             raise RangeError(f"motions[{number}]", motion.robot.name, "a dataset has one robot and one rate")
     if not motions or abs((rate := round(motions[0].rate)) - motions[0].rate) > 1e-6:
         raise RangeError("motions", motions, "expected a motion at least, and a whole number of frames a second")
     if path.exists():
         raise ClipFileError("folder", str(path), "is there already")
-    states = [own.table for own in columns]
-    episodes = [{"observation.state": q, "action": np.concatenate([q[1:], q[-1:]])} for q in states]
-    names = dict.fromkeys(("observation.state", "action"), (*ROOT, *columns[0].names))
+    episodes = [{"observation.state": q, "action": np.concatenate([q[1:], q[-1:]])} for _, q in columns]
+    names = dict.fromkeys(("observation.state", "action"), (*ROOT, *columns[0][0]))
     with validation.writing("folder", path, ClipFileError):
         path.mkdir(parents=True)
         write_lerobot_dataset(path, motions[0].robot.name, rate, names, episodes, words)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from wbc.retarget.body import SHORT
 from wbc.retarget.clip import Array, Marks, intervals
-from wbc.retarget.mapping import LimbPlaces, Places, lift
+from wbc.retarget.mapping import AHEAD_SHARE, LimbPlaces, Places, lift
 from wbc.retarget.robot_body import RobotBody, RobotLimb
 from wbc.retarget.stances import smoothed
 from wbc.rotations import continuous_quaternions, exponential
@@ -26,9 +28,13 @@ NEARLY_TURNED = -0.99
 #: A foot stands flat where its sole is tilted by less than the angle of this cosine
 SOLE_LEVEL = 0.8
 #: It cannot be flat where its ankle would have to turn farther than this beyond its limit [rad]
-BEYOND_ANKLE = 0.35
-#: A foot on its toes or heel stands so far from where its ankle's limit would hold it [rad]
+BEYOND_ANKLE = 0.1
+#: A foot is planned so far from where its ankle's limit would hold it [rad]
 ANKLE_SPARE = 0.05
+#: How often a foot on its toes or heel is turned: its ankle moves with it, and its knee with that
+TURNED = 4
+#: Until it turns by less than this [rad]
+LEAST_TURN = 1e-3
 #: Most of a leg's length that a standing leg has between hip and ankle
 STRETCH = 0.985
 #: Standard deviation of the Gaussian that the lowering of the pelvis is smoothed with [s]
@@ -141,40 +147,42 @@ def plan_motion(body: RobotBody, places: Places, marks: dict[str, Marks], rate: 
     at = _nearest(len(places.pelvis), rate, times)
     names = sorted(places.limbs, key=list(body.limbs).index)
     own = [places.limbs[name] for name in names]
-    points = [places.pelvis, *(values for limb in own for values in (limb.middle, limb.wrist, limb.end))]
+    points = [places.pelvis, *(values for limb in own for values in (limb.base, limb.middle, limb.wrist, limb.end))]
     given = [places.turn, places.chest, places.head, *(limb.rotation for limb in own)]
     # All in one spline
     pelvis, *points = np.ascontiguousarray(resampled(np.stack(points, axis=1), rate, times).swapaxes(0, 1))
     known = iter(turns_resampled(np.stack([turns for turns in given if turns is not None], axis=1), rate, times))
     turn, chest, head, *rotations = (None if turns is None else next(known) for turns in given)
-    limbs: dict[str, LimbPlan] = {}
-    for number, name in enumerate(names):
-        middle, wrist, end = points[3 * number : 3 * number + 3]
-        there = LimbPlaces(middle, wrist, end, rotations[number])
-        if body.robot.base == "fixed":
-            limbs[name] = in_the_air(there)
-            continue
-        limbs[name] = _limb_plan(body.limbs[name], there, marks[name][at], dt, hand=not body.is_foot(name))
     assert turn is not None
     assert chest is not None
-    pelvis = pelvis - np.array([0.0, 0.0, 1.0]) * lowering(body, pelvis, turn, limbs, dt)[:, None]
-    return MotionPlan(pelvis, turn, chest, head, limbs, dt)
+    there: dict[str, LimbPlaces] = {}
+    for number, name in enumerate(names):
+        base, middle, wrist, end = points[4 * number : 4 * number + 4]
+        there[name] = LimbPlaces(base, middle, wrist, end, rotations[number])
+    limbs: dict[str, LimbPlan] = {}
+    for name, limb in with_ankles(body, there, turn).items():
+        if body.robot.base == "fixed":
+            limbs[name] = in_the_air(limb)
+        else:
+            limbs[name] = _limb_plan(body.limbs[name], limb, turn, marks[name][at], dt, hand=not body.is_foot(name))
+    plan = MotionPlan(pelvis, turn, chest, head, limbs, dt)
+    return lowered(body, plan, lowering(body, plan))
 
 
 def in_the_air(limb: LimbPlaces) -> LimbPlan:
     """A limb's targets as they are, of a robot whose base is fixed: it stands on nothing."""
     never = np.zeros(len(limb.end), dtype=bool)
-    return LimbPlan(limb.middle, limb.wrist, limb.end, limb.rotation, never, never, never)
+    return LimbPlan(limb.base, limb.middle, limb.wrist, limb.end, limb.rotation, never, never, never)
 
 
-def _limb_plan(robot: RobotLimb, limb: LimbPlaces, stands: Marks, dt: float, *, hand: bool) -> LimbPlan:
+def _limb_plan(robot: RobotLimb, limb: LimbPlaces, turn: Array, stands: Marks, dt: float, *, hand: bool) -> LimbPlan:
     """A limb's targets with its stances at rest."""
     end, rotation = raised(robot, limb)
     raw, raw_rotation = end.copy(), None if rotation is None else rotation.copy()
     runs = intervals(stands)
     held, lies = stands.copy(), np.zeros(len(stands), dtype=bool)
     for number, (a, b) in enumerate(runs):
-        place, heading = standing_place(robot, limb, a, b)
+        place, heading = standing_place(robot, limb, turn, a, b)
         end[a:b] = place
         if rotation is not None and heading is not None:
             rotation[a:b] = heading
@@ -194,7 +202,7 @@ def _limb_plan(robot: RobotLimb, limb: LimbPlaces, stands: Marks, dt: float, *, 
         before = max(a - round(BEFORE / dt), free[0])
         held[before:a] = True
         lies[before:b] = hand and bool(place[2] <= robot.radius)
-    return LimbPlan(limb.middle, limb.wrist, end, rotation, stands, held, lies)
+    return LimbPlan(limb.base, limb.middle, limb.wrist, end, rotation, stands, held, lies)
 
 
 def raised(robot: RobotLimb, limb: LimbPlaces) -> tuple[Array, Array | None]:
@@ -212,7 +220,7 @@ def _lowest(robot: RobotLimb, end: Array, rotation: Array | None) -> Array:
     return np.asarray((rotation[:, 2, None] @ np.ascontiguousarray(robot.surface.T)).min(axis=2)[:, 0] + end[:, 2])
 
 
-def standing_place(robot: RobotLimb, limb: LimbPlaces, a: int, b: int) -> tuple[Array, Array | None]:
+def standing_place(robot: RobotLimb, limb: LimbPlaces, turn: Array, a: int, b: int) -> tuple[Array, Array | None]:
     """Where a stance stands, of all of its ticks, and the rotation of a foot: level, or on its toes or heel as it is in
     the mean.
     """
@@ -222,29 +230,98 @@ def standing_place(robot: RobotLimb, limb: LimbPlaces, a: int, b: int) -> tuple[
         level = float(place[2]) - robot.radius
         place[2] = robot.radius + (0.0 if level < GROUND else level)
         return place, None
-    forward, shanks = rotation[:, :, 0].mean(axis=0), limb.middle[a:b] - limb.wrist[a:b]
+    forward = rotation[:, :, 0].mean(axis=0)
     standing = exponential(np.array([[0.0, 0.0, float(np.arctan2(forward[1], forward[0]))]]))[0]
-    bend = abs(_ankle_turn(robot, standing, _median(shanks)[None]))
-    if float(_median(rotation[:, 2, 2])) > SOLE_LEVEL and bend < BEYOND_ANKLE:
-        level = float(_median(limb.wrist[a:b, 2])) - float(np.linalg.norm(robot.places[2] - robot.places[3]))
-        lowest = np.zeros(3)
-    else:
-        standing = np.asarray(Rotation.from_matrix(rotation).mean().as_matrix())
-        standing = standing @ exponential(np.array([[0.0, _ankle_turn(robot, standing, shanks), 0.0]]))[0]
+    level = float(_median(limb.wrist[a:b, 2])) - robot.ankle
+    place[2] = 0.0 if level < GROUND else level
+    turns = _standing_turns(robot, limb, turn, place, standing, slice(a, b))
+    if float(_median(rotation[:, 2, 2])) > SOLE_LEVEL and abs(float(_median(turns))) < BEYOND_ANKLE:
+        return place, standing
+    # The rotation that is nearest to the mean
+    left, _, right = np.linalg.svd(rotation.mean(axis=0))
+    standing = left @ right
+    level = float(_median(_lowest(robot, ends, rotation)))
+    for _ in range(TURNED):
+        # The lowest point of the sole stands where it is in the mean
         lowest = robot.surface[int(np.argmin(robot.surface @ standing[2]))]
-        level = float(_median(_lowest(robot, ends, rotation)))
-    # The lowest point of the sole stands where it is in the mean
-    place = _median(ends + rotation @ lowest) - standing @ lowest
-    place[2] = (0.0 if level < GROUND else level) - float(standing[2] @ lowest)
+        place = _median(ends + rotation @ lowest) - standing @ lowest
+        place[2] = (0.0 if level < GROUND else level) - float(standing[2] @ lowest)
+        turns = _standing_turns(robot, limb, turn, place, standing, slice(a, b))
+        most = float(turns[np.argmax(np.abs(turns))])
+        if abs(most) < LEAST_TURN:
+            break
+        standing = standing @ _pitched(np.array([most]))[0]
     return place, standing
 
 
-def _ankle_turn(robot: RobotLimb, standing: Array, shanks: Array) -> float:
-    """The least turn of a foot about its axis to the left with which its ankle can hold it against its shanks [rad]."""
-    along = shanks @ standing
-    leans = np.arctan2(along[:, 0], along[:, 2])
-    least, most = robot.pitch[0] + ANKLE_SPARE + leans.max(), robot.pitch[1] - ANKLE_SPARE + leans.min()
-    return float(np.clip(0.0, least, most))
+def _standing_turns(
+    robot: RobotLimb, limb: LimbPlaces, turn: Array, place: Array, standing: Array, ticks: slice
+) -> Array:
+    """Turns that the ankle of a foot needs which stands at a place, over the ticks of its stance [rad]."""
+    ankle = place + robot.ankle * standing[:, 2]
+    knee = knees([robot], limb.base[None, ticks], limb.middle[None, ticks], ankle, turn[ticks, :, 0])
+    return np.asarray(_ankle_turns([robot], standing, knee - ankle)[0])
+
+
+def with_ankles(body: RobotBody, limbs: Mapping[str, LimbPlaces], turn: Array) -> dict[str, LimbPlaces]:
+    """Targets of limbs with flat feet turned about their axes to the left as far as their ankles need it."""
+    out = dict(limbs)
+    flat = [k for k, limb in limbs.items() if body.limbs[k].contact == "flat" and limb.rotation is not None]
+    feet, own = [k for k in flat if body.is_foot(k)], [body.limbs[k] for k in flat if body.is_foot(k)]
+    if feet:
+        ankles, rotations = np.array([limbs[k].wrist for k in feet]), np.array([limbs[k].rotation for k in feet])
+        turns = _ankle_turns(own, rotations, _knees_of(own, [limbs[k] for k in feet], ankles, turn) - ankles)
+        for k, robot, rotation, angles in zip(feet, own, rotations, turns, strict=True):
+            if angles.any():
+                turned = rotation @ _pitched(angles)
+                out[k] = replace(out[k], end=out[k].wrist - robot.ankle * turned[:, :, 2], rotation=turned)
+    return out
+
+
+def _pitched(angles: Array) -> Array:
+    """Turns about a foot's axis to the left [n, 3, 3]."""
+    return exponential(angles[:, None] * np.array([0.0, 1.0, 0.0]))
+
+
+def _knees_of(robots: Sequence[RobotLimb], legs: Sequence[LimbPlaces], ankles: Array, turn: Array) -> Array:
+    """:func:`knees` of some legs."""
+    return knees(
+        robots, np.array([leg.base for leg in legs]), np.array([leg.middle for leg in legs]), ankles, turn[:, :, 0]
+    )
+
+
+def knees(robots: Sequence[RobotLimb], hips: Array, towards: Array, ankles: Array, ahead: Array) -> Array:
+    """Where knees are between hips and ankles, in the planes in which the skeleton's legs bend [legs, ticks, 3] [m].
+
+        k = h + c d + sqrt(u^2 - c^2) s,  c = (u^2 + r^2 - l^2) / (2 r)
+
+    with the hip h, the unit vector d to the ankle at the distance r, the lengths u and l of thigh and shank, and the
+    unit vector s across d, to the skeleton's knee, or from it where the robot's knee bends the other way.
+
+    Args:
+        hips, towards, ankles: of the robot, and the skeleton's knees [legs, ticks, 3] [m]. ahead: of the trunk
+            [ticks, 3]: there a straight leg bends.
+    """
+    sizes = np.array([(*robot.lengths, robot.bend) for robot in robots])
+    upper, lower, bend = sizes.T[:, :, None, None]
+    way = ankles - hips
+    distance = np.maximum(np.sqrt((way * way).sum(axis=2, keepdims=True)), SHORT)
+    way = way / distance
+    side = towards - hips + AHEAD_SHARE * upper * ahead
+    side = side - (side * way).sum(axis=2, keepdims=True) * way
+    size = np.maximum(np.sqrt((side * side).sum(axis=2, keepdims=True)), SHORT)
+    along = np.minimum(np.maximum((upper**2 + distance**2 - lower**2) / (2.0 * distance), -upper), upper)
+    return np.asarray(hips + along * way + bend * np.sqrt(upper**2 - along**2) / size * side)
+
+
+def _ankle_turns(robots: Sequence[RobotLimb], rotations: Array, shanks: Array) -> Array:
+    """The least turns of feet about their axes to the left with which ankles can hold them against shanks [legs, ticks]
+    [rad].
+    """
+    along = (shanks[:, :, None] @ rotations)[:, :, 0]
+    leans = np.arctan2(along[..., 0], along[..., 2])
+    least, most = np.array([robot.pitch for robot in robots]).T[:, :, None]
+    return np.asarray(np.minimum(np.maximum(least + ANKLE_SPARE + leans, 0.0), most - ANKLE_SPARE + leans))
 
 
 def _median(values: Array) -> Array:
@@ -265,23 +342,41 @@ def balanced(plan: MotionPlan) -> Array:
     return np.asarray(share * mean + (1.0 - share) * plan.pelvis)
 
 
-def lowering(body: RobotBody, pelvis: Array, turn: Array, limbs: dict[str, LimbPlan], dt: float) -> Array:
+def lowering(body: RobotBody, plan: MotionPlan) -> Array:
     """How much the pelvis must be lower so that standing legs reach the ground [ticks] [m]."""
-    need = np.zeros(len(pelvis))
-    for name, plan in limbs.items():
-        robot = body.limbs[name]
-        if not body.is_foot(name):
-            continue
-        hip = pelvis + turn @ ((robot.base - body.places[0]) @ body.axes)
-        up = np.array([0.0, 0.0, float(np.linalg.norm(robot.places[2] - robot.places[3]))])
-        ankle = plan.end + (plan.rotation @ up if robot.contact == "flat" and plan.rotation is not None else 0.0)
-        across = np.linalg.norm((hip - ankle)[:, :2], axis=1)
-        reach = STRETCH * sum(robot.lengths)
-        most = np.sqrt(np.maximum(reach**2 - across**2, (0.2 * reach) ** 2))
-        need = np.maximum(need, np.where(plan.held, hip[:, 2] - ankle[:, 2] - most, 0.0))
+    feet = [name for name in plan.limbs if body.is_foot(name)]
+    if not any(plan.limbs[name].held.any() for name in feet):
+        return np.zeros(plan.ticks)
+    legs = np.array([plan.limbs[name].base - _ankle_of(body.limbs[name], plan.limbs[name]) for name in feet])
+    reach = STRETCH * np.array([sum(body.limbs[name].lengths) for name in feet])[:, None]
+    most = np.sqrt(np.maximum(reach**2 - (legs[..., :2] ** 2).sum(axis=2), (0.2 * reach) ** 2))
+    over = np.where([plan.limbs[name].held for name in feet], legs[..., 2] - most, 0.0)
+    need = np.asarray(np.maximum(over.max(axis=0), 0.0))
     if not need.any():
         return need
     from scipy.ndimage import maximum_filter1d
 
-    width = max(round(2.0 * LOWERING / dt), 1)
-    return smoothed(np.asarray(maximum_filter1d(need, 2 * width + 1, mode="nearest")), LOWERING / dt)
+    width = max(round(2.0 * LOWERING / plan.dt), 1)
+    return smoothed(np.asarray(maximum_filter1d(need, 2 * width + 1, mode="nearest")), LOWERING / plan.dt)
+
+
+def _ankle_of(robot: RobotLimb, limb: LimbPlaces) -> Array:
+    """Where the ankle of a leg, or the end of one on a point, is planned [ticks, 3] [m]."""
+    if robot.contact != "flat" or limb.rotation is None:
+        return limb.end
+    return np.asarray(limb.end + robot.ankle * limb.rotation[:, :, 2])
+
+
+def lowered(body: RobotBody, plan: MotionPlan, low: Array) -> MotionPlan:
+    """A plan whose trunk is lower [ticks] [m], with knees between its hips and ankles."""
+    down, limbs = low[:, None] * np.array([0.0, 0.0, 1.0]), dict(plan.limbs)
+    feet = [name for name in limbs if body.is_foot(name)] if body.plan.upright else []
+    if feet:
+        own = [body.limbs[name] for name in feet]
+        ankles = np.array([_ankle_of(body.limbs[name], limbs[name]) for name in feet])
+        hips, towards = np.array([(limbs[name].base, limbs[name].middle) for name in feet]).swapaxes(0, 1) - down
+        middles = knees(own, hips, towards, ankles, plan.turn[:, :, 0])
+        middles[..., 2] += lift(middles[..., 2] - np.array([robot.thickness[0] for robot in own])[:, None])
+        for name, hip, middle, ankle in zip(feet, hips, middles, ankles, strict=True):
+            limbs[name] = replace(limbs[name], base=hip, middle=middle, wrist=ankle)
+    return replace(plan, pelvis=plan.pelvis - down, limbs=limbs)

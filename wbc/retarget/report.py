@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import pathlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from PIL import Image, ImageDraw
 
 from wbc import extras
 from wbc.multibody import pin
-from wbc.retarget.outputs import MOTION_FORMATS, write_motion
+from wbc.retarget.outputs import write_motion
 from wbc.retarget.poses import frame_poses
 from wbc.shapes import Box
 from wbc.track import render
@@ -27,26 +27,16 @@ if TYPE_CHECKING:
 ROBOT: Colour = (0.32, 0.42, 0.58)
 PERSON: Colour = (0.93, 0.55, 0.15)
 GROUND: Colour = (0.80, 0.78, 0.73)
-#: Radius of a bone as drawn [m]
-BONE = 0.018
 #: Size of a film [pixels]
 FILM_SIZE = (560, 330)
 #: Pictures a second of a film [Hz]
 FILM_RATE = 10.0
 #: Pictures of a film, at most
 MOST_PICTURES = 120
-#: Side that a film is seen from [rad]
-AZIMUTH = -1.0
-#: Height that it is seen from [rad]
-ELEVATION = 0.25
 #: The person stands so far beside the robot, in heights of the robot
 ASIDE = 0.8
-#: Links reach so far beyond the joints [m]
-LINK = 0.2
-#: The ground is drawn so far beyond the motion [m]
-BEYOND = 0.7
-#: Corners of meshes closer than this are drawn as one [m]
-DETAIL = 0.02
+#: Radius of a bone as drawn, in sizes of the motion
+BONE = 0.018
 
 
 def write_report(
@@ -56,35 +46,31 @@ def write_report(
     *,
     seconds: float | None = None,
     film: bool = True,
-    support: bool = False,
+    more: Mapping[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Write a clip's folder, which is there; returns the figures that ``report.json`` holds.
 
     Args:
         formats: more formats of the motion, keys of :data:`~wbc.retarget.outputs.MOTION_FORMATS`.
         seconds: time that retargeting took, with the making of its stack where that is new [s].
-        film: whether a film is drawn, and put on the page. support: whether :func:`~wbc.retarget.held` looks for forces
-            of contacts and torques of motors that hold the robot at rest; not for a robot whose base is fixed.
+        film: whether a film is drawn, and put on the page. more: plain data that the figures hold, too.
 
     Raises:
         UnknownNameError: no such format. ClipFileError: a file cannot be written.
     """
-    write_motion(motion, folder / "motion.npz", "npz")
+    write_motion(motion, folder / "motion")
     for kind in formats:
         if kind != "npz":
-            write_motion(motion, folder / f"motion-{kind}{MOTION_FORMATS.get(kind, '')}", kind)
-    figures: dict[str, Any] = {"clip": motion.clip.name, "robot": motion.robot.name, **motion.errors.figures}
+            write_motion(motion, folder / f"motion-{kind}", kind)
+    figures: dict[str, Any] = {"clip": motion.clip.name, "robot": motion.robot.name} | motion.errors.figures
+    figures |= more or {}
     title, lead = f"{figures['clip']} on {figures['robot']}", f"{len(motion.q)} frames at {motion.rate:g} Hz"
     lines = [f"{title}: {lead}", *str(motion.errors).splitlines()]
     if seconds is not None:
         figures |= {"seconds": seconds, "frames_a_second": len(motion.q) / max(seconds, 1e-9)}
         lines.insert(1, f"retargeted in {seconds:.3g} s: {figures['frames_a_second']:.4g} frames a second")
-    if support and motion.robot.base != "fixed":
-        from wbc.retarget.holding_forces import held
-
-        at_rest = held(motion)
-        figures |= {"held_at_rest": at_rest.share, "support": str(at_rest)}
-        lines.append(str(at_rest))
+    if "support" in figures:
+        lines.append(figures["support"])
     figures |= {"given_up": [str(entry) for entry in motion.given_up], "notes": list(motion.notes)}
     lines += [f"gave way: {entry}" for entry in figures["given_up"] or ["nothing"]]
     text = "\n".join([*lines, *(f"note: {note}" for note in motion.notes)])
@@ -102,32 +88,26 @@ def write_report(
 
 def save_motion_film(motion: Retargeted, file: pathlib.Path) -> pathlib.Path:
     """A film of the robot and, beside it, the person's skeleton; the camera stands still. Returns the file."""
-    robot, clip, parents = motion.robot, motion.clip, motion.clip.skeleton.parents
+    robot, clip = motion.robot, motion.clip
     count = int(np.clip(motion.time[-1] * FILM_RATE, 2, MOST_PICTURES))
     rows = np.unique(np.linspace(0, len(motion.q) - 1, count).astype(int))
     frames = tuple(frame for frame in robot.frame_names if frame.startswith("retarget_"))
     extent = frame_poses(robot, frames, motion.q[rows])[1].reshape(-1, 3)
-    size = min(1.0, float(np.linalg.norm(np.ptp(extent, axis=0))) or 1.0)
-    extent = np.concatenate([extent, extent.max(axis=0, keepdims=True) + LINK * size])
     # The person, as tall as the robot, beside it
     points = clip.points[np.clip(np.round(motion.time[rows] * clip.rate).astype(int), 0, len(clip.points) - 1)]
-    tall, height = float(np.ptp(clip.points[:, :, 2], axis=1).max()), float(np.ptp(extent[:, 2])) or 1.0
-    points = points * (height / max(tall, 1e-6))
+    height = float(np.ptp(extent[:, 2])) or 1.0
+    points = points * (height / max(float(np.ptp(points[:, :, 2], axis=1).max()), 1e-6))
     aside = extent.mean(axis=0) - points.mean(axis=(0, 1))
     aside[1] += 0.5 * float(np.ptp(points[:, :, 1]) + np.ptp(extent[:, 1])) + ASIDE * height
-    points = points + np.array([*aside[:2], 0.0 if robot.base != "fixed" else aside[2]])
-    if max(parents) < 0:
-        # Markers without bones: each with the nearest one
-        middle = clip.points[len(clip.points) // 2]
-        apart = np.linalg.norm(middle[:, None] - middle[None], axis=2) + 1e3 * np.eye(len(middle))
-        parents = tuple(apart.argmin(axis=1).tolist())
-    bones = [(parent, joint) for joint, parent in enumerate(parents) if parent >= 0]
+    points = points + aside * np.array([1.0, 1.0, robot.base == "fixed"])
+    bones = [(parent, joint) for joint, parent in enumerate(clip.skeleton.parents) if parent >= 0]
     everything = np.concatenate([points.reshape(-1, 3), extent])
-    low, high = everything.min(axis=0) - BEYOND * size, everything.max(axis=0) + BEYOND * size
-    scene = Scene(robot, colours={"*": ROBOT}, floor=False, detail=DETAIL * size)
-    ground = pin.SE3(np.eye(3), np.array([*(0.5 * (low + high))[:2], min(0.0, float(everything[:, 2].min())) - 0.01]))
-    scene.add_shape(Box((*(high - low)[:2].tolist(), 0.02)), ground, "ground", GROUND)
-    shot, pictures = scene.film(render.framed(everything, FILM_SIZE, AZIMUTH, ELEVATION, filled=0.9)), []
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    size = min(1.0, float(np.linalg.norm(np.ptp(extent, axis=0))) or 1.0)
+    scene = Scene(robot, colours={"*": ROBOT}, floor=False, detail=0.02 * size)
+    ground = pin.SE3(np.eye(3), np.array([*(0.5 * (low + high))[:2], min(0.0, float(low[2])) - 0.01]))
+    scene.add_shape(Box((*(high - low + 1.8 * size)[:2].tolist(), 0.02)), ground, "ground", GROUND)
+    shot, pictures = scene.film(render.framed(everything, FILM_SIZE, azimuth=-1.0, elevation=0.25, filled=0.8)), []
     for row, places in zip(rows, points, strict=True):
         scene.add_robot(motion.q[row])
         for line in places[bones]:

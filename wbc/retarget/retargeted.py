@@ -74,18 +74,14 @@ class MotionErrors:
         lines = [f"slide in stance: {1e3 * figures['slide']:.3g} mm at most"]
         lines += [f"  {foot}: {1e3 * slide:.3g} mm" for foot, slide in figures["slides"].items()]
         if "penetration" in figures:
-            frames = figures["penetration_frames"]
-            lines.append(
-                f"below the ground: {1e3 * figures['penetration']:.3g} mm at most, {frames} frames beyond 1 mm"
-            )
+            deepest, frames = 1e3 * figures["penetration"], figures["penetration_frames"]
+            lines.append(f"below the ground: {deepest:.3g} mm at most, {frames} frames beyond 1 mm")
         for what, share in (("position", ""), ("velocity", "fastest"), ("acceleration", "quickest")):
             most = f", at most {figures[share]:.3g} of the limit" if share else ""
             lines.append(f"{what} limits: {figures[f'{what}_breaches']} frames beyond them{most}")
-        lines.append(f"jumps: {figures['jumps']}")
-        lines.append(f"key points from their targets: {1e3 * self.mean:.3g} mm in the mean")
-        for name, far in figures["errors"].items():
-            lines.append(f"  {name}: {1e3 * far['mean']:.3g} mm, {1e3 * far['largest']:.3g} mm at most")
-        return "\n".join(lines)
+        lines += [f"jumps: {figures['jumps']}", f"key points from their targets: {1e3 * self.mean:.3g} mm in the mean"]
+        points = [(name, 1e3 * far["mean"], 1e3 * far["largest"]) for name, far in figures["errors"].items()]
+        return "\n".join([*lines, *(f"  {name}: {mean:.3g} mm, {most:.3g} mm at most" for name, mean, most in points)])
 
 
 @dataclass(frozen=True, eq=False)

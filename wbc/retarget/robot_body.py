@@ -14,20 +14,21 @@ from wbc.multibody import pin
 from wbc.retarget.body import BodyError, BodyPlan, find_body
 from wbc.retarget.clip import Array, Skeleton, ancestors
 from wbc.retarget.hands import find_hand
-from wbc.retarget.solids import LinkBalls, balls_of_joints
+from wbc.retarget.solids import balls_of_joints
 from wbc.retarget.words import ARM_WORDS, LEG_WORDS, side_of
 from wbc.robot import Robot
+from wbc.robot.geometry.link_balls import LinkBalls
 
 log = logging.getLogger("wbc")
 
-#: Balls no farther from each other are at one place [m]: descriptions are rounded to less
-SAME_PLACE = 1e-4
 #: Cosine of the angle by which right and left may be off a coordinate axis: rest poses of robots are not symmetric
 STRAIGHT = 0.9
 #: Angles to which each joint is turned to see what it changes [rad]
 SWEEP = np.linspace(-np.pi, np.pi, 17)
 #: An axis whose part along a bone is below this turns the next bone against it; above, about itself
 ACROSS = 0.7
+#: A knee that is bent by less than this is straight [rad]
+STRAIGHT_KNEE = 0.05
 #: A joint at least this share of the way from the middle hinge to the end may be an ankle or a wrist
 DISTAL = 0.5
 #: Joints before the middle hinge whose axes meet in the hip or the shoulder
@@ -79,6 +80,7 @@ class RobotLimb:
         thickness: height of middle, wrist and end above the ground where the limb lies on it [m].
         pitch: least and most turn of the end against its last bone, from the bone along the end's z axis, about the
             axis to the left, that joints behind the middle hinge allow [2] [rad].
+        bend: 1 where its middle hinge lies ahead of the line from base to wrist as it bends, -1 where it lies behind.
         guessed: the description says nothing of the foot's or hand's size.
     """
 
@@ -92,6 +94,7 @@ class RobotLimb:
     surface: Array = field(default_factory=lambda: np.zeros((1, 3)))
     thickness: tuple[float, float, float] = (0.0, 0.0, 0.0)
     pitch: tuple[float, float] = (0.0, 0.0)
+    bend: float = 1.0
     guessed: bool = False
 
     @property
@@ -109,6 +112,11 @@ class RobotLimb:
         """Base to middle, middle to wrist [m]."""
         upper, lower = np.linalg.norm(np.diff(self.places[:3], axis=0), axis=1)
         return float(upper), float(lower)
+
+    @cached_property
+    def ankle(self) -> float:
+        """Height of the ankle above the sole [m]."""
+        return float(np.linalg.norm(self.places[2] - self.places[3]))
 
 
 @dataclass(frozen=True)
@@ -179,7 +187,10 @@ class RestPose:
         pin.updateFramePlacements(model, data)
         pin.computeJointJacobians(model, data, robot.neutral)
         self.robot, self.fixed, self.balls, self._data = robot, robot.base == "fixed", balls, data
-        self.poses, self.axes = list(data.oMi), np.array([self._axis(joint) for joint in range(model.njoints)])
+        self.poses, self.axes = list(data.oMi), np.zeros((model.njoints, 3))
+        for joint in np.flatnonzero(np.array(model.nvs) == 1).tolist():
+            twist = data.J[:, int(model.idx_vs[joint])]
+            self.axes[joint] = twist[3:] if np.abs(twist[3:]).max() > 1e-9 else twist[:3]
         names, parents = [str(name) for name in list(model.names)], [-1, *map(int, list(model.parents)[1:])]
         points = [np.array(pose.translation) for pose in self.poses]
         if not self.fixed:
@@ -194,13 +205,6 @@ class RestPose:
         ]
         self.tree = Skeleton(tuple(names), tuple(parents), np.array(offsets), (False,) * len(names))
         self.points = self.tree.rest
-
-    def _axis(self, joint: int) -> Array:
-        model = self.robot.model
-        if int(model.nvs[joint]) != 1:
-            return np.zeros(3)
-        twist = pin.getJointJacobian(model, self._data, joint, pin.WORLD)[:, int(model.idx_vs[joint])]
-        return np.asarray(twist[3:] if np.abs(twist[3:]).max() > 1e-9 else twist[:3])
 
     def _tip(self, joint: int, chain: list[int]) -> Array:
         """The point of a last link that is farthest from the joint before; ``chain``: it and the joints above it."""
@@ -227,9 +231,9 @@ class RestPose:
     def reach(self, joint: int, way: Array) -> float:
         """How far a link stands out from its joint along a direction [m]; 0 without bodies."""
         balls = self.balls.get(joint) if joint else None
-        return (
-            0.0 if balls is None else float((balls.centers @ (self.poses[joint].rotation.T @ way) + balls.radii).max())
-        )
+        if balls is None:
+            return 0.0
+        return float((balls.centers @ (self.poses[joint].rotation.T @ way) + balls.radii).max())
 
 
 def body_of(robot: Robot) -> RobotBody:
@@ -244,7 +248,7 @@ def body_of(robot: Robot) -> RobotBody:
     plan, fill = hand_plan(rest), _finger
     if plan is None:
         rest, fill = RestPose(robot, balls_of_joints(robot)), _limb
-        plan = find_body(rest.tree, field="robot", arms=rest.fixed, straight=STRAIGHT)
+        plan = find_body(rest.tree, field="robot", arms=rest.fixed, straight=STRAIGHT, up=np.eye(3)[2])
     said = plan.tree.said([*plan.limbs.values()])
     if not rest.fixed and "left_arm" not in plan.limbs and said & ARM_WORDS and not said & LEG_WORDS:
         raise BodyError("robot", robot.name, "it has arms and no legs to stand on; load it with base='fixed'")
@@ -346,7 +350,8 @@ def _limb(name: str, rest: RestPose, plan: BodyPlan) -> tuple[RobotLimb, Frames]
     limb = RobotLimb(
         joints, f"{frame}_middle", f"{frame}_wrist" if wrist else "", frame, places, radius, corners, surface,
         (rest.reach(middle, outer), rest.reach(wrist, outer), radius),
-        _pitch(rest, plan.axes, joints[joints.index(middle) + 1 :], places), there is None,
+        _pitch(rest, plan.axes, joints[joints.index(middle) + 1 :], places),
+        _bend(rest, plan.axes[:, 1], middle, places), there is None,
     )  # fmt: skip
     frames = {frame: (last, end), limb.middle: (middle, rest.poses[middle])}
     return limb, frames | ({limb.wrist: (wrist, rest.poses[wrist])} if wrist else {})
@@ -365,6 +370,16 @@ def _pitch(rest: RestPose, axes: Array, joints: tuple[int, ...], places: Array) 
             ends = np.sign(along) * (limits - robot.neutral[int(robot.model.idx_qs[joint])])
             least, most = least + float(ends.min()), most + float(ends.max())
     return least, most
+
+
+def _bend(rest: RestPose, left: Array, middle: int, places: Array) -> float:
+    """Which way a middle hinge is bent at rest, and where it is straight there bends farthest; see ``RobotLimb``."""
+    robot, number, axis = rest.robot, int(rest.robot.model.idx_vs[middle]), rest.axes[middle]
+    upper, lower, _ = np.diff(places, axis=0)
+    bent = float(np.arctan2(np.cross(upper, lower) @ axis, upper @ lower))
+    if abs(bent) < STRAIGHT_KNEE:
+        bent = float(robot.limits.position_lower[number] + robot.limits.position_upper[number])
+    return float(np.sign(bent * (axis @ left))) or 1.0
 
 
 def _middle_hinge(rest: RestPose, joints: tuple[int, ...], tip: Array) -> int:
@@ -431,11 +446,9 @@ def _rectangle(lower: Array, upper: Array) -> Array:
 def _ball(centers: Array, radii: Array, tip: Array) -> tuple[Array, float]:
     """Centre and radius of the ball at the end of a point foot."""
     if (radii > 0.0).any():
-        balls = np.flatnonzero(radii > 0.0)
-        away = np.linalg.norm(centers[balls] - tip, axis=1)
+        away = np.where(radii > 0.0, np.linalg.norm(centers - tip, axis=1), np.inf)
         # Of several at one place, as of a shin that ends in a foot, the largest
-        nearest = balls[away < away.min() + SAME_PLACE]
-        nearest = nearest[int(np.argmax(radii[nearest]))]
+        nearest = np.lexsort((-radii, np.round(away, 4)))[0]
         return centers[nearest], float(radii[nearest])
     # Corners of a mesh: the ball through those near the tip
     away = np.linalg.norm(centers - tip, axis=1)

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import logging
-from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
 
 from wbc.errors import WbcError
 from wbc.multibody import pin, to_pin
@@ -15,7 +13,8 @@ from wbc.retarget.clip import Array
 from wbc.robot import Robot
 from wbc.robot.geometry.bodies import Raw, RawBox, RawCylinder, RawEllipsoid, bodies_of
 from wbc.robot.geometry.hull import Hull
-from wbc.robot.geometry.meshes import Mesh, box_mesh, spread_directions
+from wbc.robot.geometry.link_balls import LinkBalls
+from wbc.robot.geometry.meshes import Mesh, box_mesh
 from wbc.shapes import Capsule, Sphere
 from wbc.track.scene import link_meshes
 
@@ -23,45 +22,6 @@ log = logging.getLogger("wbc")
 
 #: Corners about the rim of a cylinder
 RIM = 16
-#: Directions in which balls of links are sampled [1]
-DIRECTIONS = 1500
-#: How much less exact than the one before a hull is tried that has too many corners [1]
-COARSER = 1.5
-
-
-@dataclass(frozen=True)
-class LinkBalls:
-    """Balls whose hull is what a link touches with; corners of meshes have the radius 0.
-
-    Attributes:
-        centers: in the frame of the joint that carries them [balls, 3] [m]. radii: [balls] [m].
-    """
-
-    centers: Array
-    radii: Array
-
-    @property
-    def middle(self) -> Array:
-        """Of the box around them."""
-        radii = self.radii[:, None]
-        return np.asarray(0.5 * ((self.centers - radii).min(axis=0) + (self.centers + radii).max(axis=0)))
-
-    def moved(self, placement: pin.SE3) -> LinkBalls:
-        """The same in another frame, in which this one is placed so."""
-        return LinkBalls(self.centers @ np.asarray(placement.rotation).T + placement.translation, self.radii)
-
-    def corners(self, count: int, exact: float) -> Array:
-        """Points whose hull is that of the balls; at most ``count``, to ``exact`` [m] where so many can be."""
-        ways = spread_directions(DIRECTIONS) * np.array([1.0, -1.0, 1.0])
-        far = (self.centers @ ways.T + self.radii[:, None]).argmax(axis=0)
-        points = self.centers[far] + ways * self.radii[far, None]
-        # All corners and what stands out of them of the balls, where that is not too much
-        every = np.unique(np.concatenate([self.centers[self.radii == 0.0], points[self.radii[far] > 0.0]]), axis=0)
-        chosen = every
-        with contextlib.suppress(QhullError):
-            while len(chosen) > count:
-                chosen, exact = every[ConvexHull(every, qhull_options=f"W{exact}").vertices], COARSER * exact
-        return chosen
 
 
 def balls_of_joints(robot: Robot) -> dict[int, LinkBalls]:
@@ -77,7 +37,7 @@ def balls_of_joints(robot: Robot) -> dict[int, LinkBalls]:
     for link, shapes in robot.shapes.items():
         for placed in shapes:
             if isinstance(placed.shape, (Sphere, Capsule)):
-                add(link, _balls(placed.shape), placed.placement)
+                add(link, LinkBalls.of(placed.shape), placed.placement)
     with contextlib.suppress(WbcError):
         for body in bodies_of(robot):
             if body.mesh or not robot.shapes.get(body.link):
@@ -109,9 +69,8 @@ def _balls(body: Raw) -> LinkBalls:
     """Of a body in its own frame."""
     centers, radius = np.zeros((0, 3)), 0.0
     if isinstance(body, (Sphere, Capsule)):
-        *ends, radius = body.capsule()
-        centers = np.array(ends)
-    elif isinstance(body, RawEllipsoid):
+        return LinkBalls.of(body)
+    if isinstance(body, RawEllipsoid):
         radius = float(np.min(body.radii))
         centers = np.diag(body.radii - radius)[[0, 0, 1, 1, 2, 2]] * np.array([1, -1] * 3)[:, None]
     elif isinstance(body, RawCylinder):

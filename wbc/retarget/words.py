@@ -20,12 +20,6 @@ HIND = {"hind", "rear", "back", "hl", "hr", "rl", "rr", "bl", "br", "lh", "rh", 
 ARM_WORDS = {"arm", "hand", "wrist", "elbow", "shoulder", "forearm", "gripper"}
 #: Words of a single pair of limbs that is legs
 LEG_WORDS = {"leg", "hip", "knee", "ankle", "foot", "toe", "thigh", "shin"}
-#: What markers of optical motion capture are called without their side
-MARKERS = {
-    "ank", "toe", "hee", "asi", "psi", "kne", "tib", "thi", "sho", "elb", "wra", "wrb", "fin", "fhd", "bhd", "mt",
-}  # fmt: skip
-#: What a first letter l or r says the side of
-SIDED = MARKERS | LEG_WORDS | (ARM_WORDS - {"forearm", "gripper"})
 #: Words of parts of a body, by part
 PARTS = {
     "head": {"head", "neck", "nose", "skull", "hed", "hd", "fhd", "bhd"},
@@ -42,6 +36,8 @@ PARTS = {
     "asis": {"asi", "asis"},
     "psis": {"psi", "psis"},
 }
+#: What a first letter l or r says the side of: parts, and markers of shanks, thighs and feet
+SIDED = set[str]().union(*PARTS.values(), LEG_WORDS, ARM_WORDS, {"tib", "thi", "mt"}) - {"forearm", "gripper"}
 
 
 def words(name: str) -> list[str]:

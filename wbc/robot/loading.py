@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wbc import validation
-from wbc.errors import RobotFileError, ShapeError, UnknownNameError
+from wbc.errors import BoundsError, RobotFileError, ShapeError, UnknownNameError
 from wbc.multibody import algebra, is_model
-from wbc.robot.assembly import assemble, override_limits
+from wbc.robot.assembly import SLIGHT, assemble, override_limits
 from wbc.robot.recipe import Recipe
 from wbc.robot.robot import Robot, changed
 from wbc.robot.sources.description import Description, with_base
@@ -125,7 +125,7 @@ def finish(
         states |= srdf.states() if recipe.state else {}
     if not recipe.state and "home" in states:
         recipe = replace(recipe, state="home")
-    robot = override_limits(assemble(description, recipe, states), limits)
+    robot = _followed(override_limits(assemble(description, recipe, states), limits))
     if shapes == "none" or not (robot.source or recipe.shapes or geometry is not None):
         return robot
     if shapes == "auto" and recipe.shapes:
@@ -138,6 +138,33 @@ def finish(
         return _with_pairs(fitted, recipe)
     described = description_shapes(robot, package_dirs, exact=shapes == "exact", geometry=geometry)
     return _with_pairs(described, recipe)
+
+
+def _followed(robot: Robot) -> Robot:
+    """The robot, with a warning and a note of leaders whose range their followers' own limits cut.
+
+    Raises:
+        BoundsError: no value of a leader is left.
+    """
+    own, names, said = robot.limits, robot.dof_names, []
+    try:
+        left = robot.coupled(own)
+    except BoundsError as error:
+        raise error.about(robot.source or robot.name) from None
+    for one in robot.couplings:
+        low, high = own.position_lower[one.leader], own.position_upper[one.leader]
+        if one.ratio == 0.0 or not np.isfinite([low, high]).all():
+            continue
+        ends = one.of_leader(own.position_lower[one.follower], own.position_upper[one.follower])
+        if max(ends[0] - low, high - ends[1]) > SLIGHT:
+            kept = f"{left.position_lower[one.leader]:.6g} to {left.position_upper[one.leader]:.6g}"
+            whole = f"{names[one.leader]} has {kept} of its {low:.6g} to {high:.6g} left"
+            said.append(f"{whole}, by the limits of {names[one.follower]}, which follows it")
+    if not said:
+        return robot
+    log.warning("%s: %s", robot.source or robot.name, "; ".join(said))
+    before = [robot.notes["mimic"]] if "mimic" in robot.notes else []
+    return changed(robot, notes={**robot.notes, "mimic": "; ".join([*before, *said])})
 
 
 def _with_rotors(description: Description, srdf: Srdf) -> Description:
@@ -204,11 +231,7 @@ def _with_pairs(robot: Robot, recipe: Recipe, file: str = "") -> Robot:
 def looks_like_path(text: str) -> bool:
     """Whether a string that is no known robot name is meant as a path."""
     path = pathlib.Path(text)
-    return (
-        path.suffix.lower() in (".urdf", ".xml", ".mjcf", ".sdf", XACRO, *USD)
-        or len(path.parts) > 1
-        or validation.exists("robot", text)
-    )
+    return path.suffix != "" or len(path.parts) > 1 or validation.exists("robot", text)
 
 
 def unknown(name: str, names: Iterable[str]) -> UnknownNameError:

@@ -35,7 +35,10 @@ class MotorSpace:
         free = axes[self._held :].T
         left, moved, right = np.linalg.svd(free[self._said])
         lost = -1
-        for least, motion in ((sizes[: self._held], axes[self._held - 1]), (moved[:count], free @ right[count - 1])):
+        for least, motion in (
+            (sizes[: self._held], axes[self._held - 1 : self._held]),
+            (moved[:count], right[count - 1 : count] @ free.T),
+        ):
             if (least <= DEPENDENT).any():
                 lost = int(np.abs(motion).argmax())
         inverse = right[:count].T @ (left[:, :count] / np.maximum(moved[:count], DEPENDENT)).T

@@ -14,7 +14,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wbc import pickling, validation
-from wbc.errors import DuplicateNameError, RangeError, RobotFileError, RotationError, ShapeError, UnsupportedJointError
+from wbc.errors import (
+    BoundsError,
+    DuplicateNameError,
+    RangeError,
+    RobotFileError,
+    RotationError,
+    ShapeError,
+    UnsupportedJointError,
+)
 from wbc.multibody import CONVERTED, algebra, in_pinocchio, own, pin, to_pin
 from wbc.quick_dataclasses import dataclass
 from wbc.robot.limits import Limits
@@ -57,6 +65,11 @@ class Coupling:
     leader: int
     ratio: float
     offset: float = 0.0
+
+    def of_leader(self, low: float, high: float) -> tuple[float, float]:
+        """Between which values of the leader the follower is from ``low`` to ``high``: q_l = (q_f - offset) / ratio."""
+        first, last = sorted(((low - self.offset) / self.ratio, (high - self.offset) / self.ratio))
+        return first, last
 
 
 @in_pinocchio("model")
@@ -452,11 +465,11 @@ class Robot:
 
             q_f = ratio q_l + offset,   v_f = ratio v_l,   a_f = ratio a_l
 
-        so that one interval of the leader, times the ratio, is that of each follower. Where ranges exclude each other
-        it is the leader's own. Efforts stay as they are.
+        so that one interval of the leader, times the ratio, is that of each follower. Efforts stay as they are.
 
         Raises:
             ShapeError: no Limits, or of another number of degrees of freedom.
+            BoundsError: a follower whose range no value of its leader's leads into.
         """
         limits = validation.instance("limits", limits, Limits, "wbc.robot.Limits")
         validation.real_array("limits.velocity", limits.velocity, (self.nv,), finite=False)
@@ -468,10 +481,7 @@ class Robot:
         # as often as there are couplings: a follower may lead another
         for one in moved * len(moved):
             if index[one.leader] >= 0:
-                ends = sorted((bound[one.follower] - one.offset) / one.ratio for bound in (low, high))
-                narrow = max(low[one.leader], ends[0]), min(high[one.leader], ends[1])
-                if narrow[0] <= narrow[1]:
-                    low[one.leader], high[one.leader] = narrow
+                low[one.leader], high[one.leader] = self._left(one, low, high)
             for most in rates:
                 most[one.leader] = min(most[one.leader], most[one.follower] / abs(one.ratio))
         for one in moved * len(moved):
@@ -481,6 +491,16 @@ class Robot:
             for most in rates:
                 most[one.follower] = most[one.leader] * abs(one.ratio)
         return limits.override(position_lower=low, position_upper=high, velocity=rates[0], acceleration=rates[1])
+
+    def _left(self, one: Coupling, low: Array, high: Array) -> tuple[float, float]:
+        """What is left of a leader's range where its follower keeps to its own."""
+        own, ends = (low[one.leader], high[one.leader]), one.of_leader(low[one.follower], high[one.follower])
+        least, most = max(own[0], ends[0]), min(own[1], ends[1])
+        if least > most + SAME:
+            leader, follower = self.dof_names[one.leader], self.dof_names[one.follower]
+            reason = f"no value is left: {follower} follows it, and is within its own limits from {ends[0]:.6g} to "
+            raise BoundsError(f"limits of {leader}", [float(end) for end in own], f"{reason}{ends[1]:.6g} of {leader}")
+        return min(least, most), max(least, most)
 
     def with_frame(self, name: str, parent: str, placement: Any = None) -> Robot:
         """A copy with one more frame, fixed to ``parent`` at ``placement`` (default: identity).

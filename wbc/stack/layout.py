@@ -220,14 +220,14 @@ class Layout:
 
     def dof_scales(self, stack: Declaration) -> np.ndarray:
         """Scale of each variable: the characteristic length for metres, 1 for radians and shares; of wrenches see
-        :func:`wbc.tasks._contact.force_sizes`.
+        :meth:`wbc.tasks._contact.Contact.sizes`.
         """
         own = [stack.length if u == "m" else 1.0 for u in stack.robot.dof_units]
         out = np.array(own + [1.0] * (self.variables - self.nv))
         for name, span in self.forces.items():
             item = self.blocks[name].entry.item
             assert isinstance(item, Contact)
-            out[span] = force_sizes(stack.robot)[list(item.axes)]
+            out[span] = item.sizes(stack.robot)
         out[self.loop_forces] = force_sizes(stack.robot)[[0 if unit == "m" else 3 for _, unit in self.loop_rows]]
         return out
 

@@ -58,6 +58,8 @@ STEEPER = 100.0
 TURNING = 1.0
 #: What exact rows may miss 0 at q (+) v dt by [rad, or characteristic lengths]
 EXACT = 1e-10
+#: What they give way by from where on, likewise
+OPENED = 1e-9
 #: How often exact rows are corrected
 REFINED = 24
 #: How fast a robot whose base floats loses its velocity where a tick has no answer [1/s]; as in ``native/settings.h``

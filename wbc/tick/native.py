@@ -73,7 +73,7 @@ class CompiledTick(Buffers, ABC):
         self._sides = view("free_low"), view("free_high")
         self._give, self.bend = view("give"), view("bend")
         self.curving, self.stopped, self.shortened = view("curving"), view("stopped"), view("shortened")
-        self._library.wbc_tick_find_lost.restype = ctypes.c_double
+        self._library.wbc_tick_find_lost.restype = self._library.wbc_tick_ease.restype = ctypes.c_double
         self.step_function = self._library.wbc_tick_step
         #: one tick; returns its flag
         self.call: Callable[[], int] = builtin(self._library.wbc_python_step, self.pointer.value or 0)
@@ -213,6 +213,21 @@ class CompiledTick(Buffers, ABC):
         """
         return float(self._library.wbc_tick_find_lost(self.pointer, int(everything)))
 
+    def ease(self, limits: bool) -> tuple[float, Array, Array]:
+        """Room for closed loops in the QP at hand, which has no answer: (what their rows have, in their units, 0 where
+        they do not give way last; lower and upper bounds of variables and rows).
+
+        Args:
+            limits: limits of motion give way, too, as far as loops need it; by how much is in the report.
+        """
+        room = float(self._library.wbc_tick_ease(self.pointer, int(limits)))
+        return (room, *self._bounds())
+
+    def _bounds(self) -> tuple[Array, Array]:
+        low, high = self._low.copy(), self._high.copy()
+        low[low <= -INFINITE], high[high >= INFINITE] = -np.inf, np.inf
+        return low, high
+
     def check(self) -> int:
         """Take q and a measured velocity over, or put the last good q back; negative for refused inputs."""
         return int(self._library.wbc_tick_check(self.pointer))
@@ -351,9 +366,7 @@ class CompiledTick(Buffers, ABC):
         nv = self._layout.variables
         above = self._H[:, :nv]
         H = np.where(self._upper, above, above.T)
-        low, high = self._low.copy(), self._high.copy()
-        low[low <= -INFINITE], high[high >= INFINITE] = -np.inf, np.inf
-        return QP(H, self._g[:nv].copy(), low, high, self._A.copy(), self._give.copy())
+        return QP(H, self._g[:nv].copy(), *self._bounds(), self._A.copy(), self._give.copy())
 
 
 class NativeTick(CompiledTick):

@@ -27,6 +27,7 @@ from wbc.tick.buffers import (
     FIRMLY,
     INFINITE,
     KNOWN,
+    OPENED,
     OPTIMAL,
     REFINED,
     RELAXED,
@@ -93,6 +94,8 @@ class SolvedTick(Buffers):
         general = layout.of_form("margins", "rows")
         exact = [bool(getattr(block.entry.item, "exact", False)) for block in general for _ in block.rows]
         self._exact = np.array(exact, dtype=np.bool_)
+        #: room that closed loops have in their rows, in units of these, see ``native/ease.h``
+        self._room = 0.0
         self._hard = (np.array(layout.row_levels) < 0) & (np.array(layout.price_at) < 0)
         #: strict levels, None where there is one
         self.levels: Levels | None = None
@@ -138,22 +141,24 @@ class SolvedTick(Buffers):
                 flag = self._answered(qp)
         flag, worst = self._corrected(qp, flag, everything)
         for n in range(SHORTER):
-            if flag not in (SOLVED, RELAXED) or not (worst > BENDS or (bends and n == 0 and self._turns_round())):
+            bent = self._bent_by(worst, OPENED) > 1.0 or (bends and n == 0 and self._turns_round())
+            if flag not in (SOLVED, RELAXED) or not bent:
                 break
             self.bend[:] = 0.0
             self.shortened[0] = STEEPER * self.shortened[0] or float((qp.H.diagonal() * self._own_scales**2).max())
             qp = self.assembly.qp()
             flag, worst = self._corrected(qp, self._answered(qp), everything)
         lost, dt = self.report[self._memory["lost"]], float(self.dt[0])
-        if worst > BENDS and flag in (SOLVED, RELAXED):
-            rates = np.abs(lost) / dt
+        if self._bent_by(worst, OPENED) > 1.0 and flag in (SOLVED, RELAXED):
+            rates, most = np.abs(lost) / dt, np.where(self._exact, OPENED / dt, BENDS)
             slack = self.report[self._memory["slack"]]
-            slack[:] = np.maximum(slack, np.where(rates > BENDS * self._units, rates, 0.0))
+            slack[:] = np.maximum(slack, np.where(rates > most * self._units, rates, 0.0))
             flag = RELAXED
             self.report[self._memory["flag"]] = flag
         self.assembly.look_ahead()
         self.assembly.commanded(self.report[self._memory["v"]], flag in (SOLVED, RELAXED))
-        return flag
+        # closed loops may have passed limits on their way
+        return int(self.report[self._memory["flag"]][0]) if flag == SOLVED else flag
 
     def _corrected(self, qp: QP, flag: int, everything: bool) -> tuple[int, float]:
         """Sides are moved until equality rows make up for what they lose, as far as that gets less: the flag, and what
@@ -161,7 +166,7 @@ class SolvedTick(Buffers):
         """
         lost, dt = self.report[self._memory["lost"]], float(self.dt[0])
         worst = self.assembly.find_lost(everything)
-        off = self._bent_by(worst)
+        off = self._bent_by(worst, EXACT)
         for _ in range(BENDINGS if worst > BENDS else REFINED):
             if not off > 1.0 or flag not in (SOLVED, RELAXED):
                 break
@@ -169,16 +174,19 @@ class SolvedTick(Buffers):
             qp = self._bent(qp, last - lost / dt)
             flag = self._answered(qp)
             worst = self.assembly.find_lost(everything)
-            off = self._bent_by(worst)
+            off = self._bent_by(worst, EXACT)
             if not off < before or flag not in (SOLVED, RELAXED):
                 flag = self._answered(self._bent(qp, last))
                 return flag, self.assembly.find_lost(everything)
         return flag, worst
 
-    def _bent_by(self, worst: float) -> float:
-        """How far rows are from what is allowed: ``worst`` of those that bend, and what exact ones miss."""
+    def _bent_by(self, worst: float, most: float) -> float:
+        """How far rows are from what is allowed: ``worst`` of those that bend, and what exact ones miss, which may be
+        ``most``, and what room they have.
+        """
         missed = np.abs(self.report[self._memory["lost"]]) / self._units
-        return max(worst / BENDS, float(missed[self._exact].max(initial=0.0)) / EXACT)
+        most += self._room * float(self.dt[0])
+        return max(worst / BENDS, float(missed[self._exact].max(initial=0.0)) / most)
 
     def _turns_round(self) -> bool:
         """Whether a joint moves fast the other way than in the last tick."""
@@ -200,6 +208,7 @@ class SolvedTick(Buffers):
     def _answered(self, qp: QP) -> int:
         """Solve a QP and write the report as far as it is about that."""
         wide = qp.with_slacks().definite()
+        self.report[self._memory["beyond"]] = 0.0
         flag, x, answer = self.answer(wide)
         v, levels = self.below(qp, x[: self._nv], answer)
         memory, report = self._memory, self.report
@@ -228,8 +237,9 @@ class SolvedTick(Buffers):
             slack = self.levels.with_soft(qp, v, slack)
         slack = self._soft.reported(qp, v, self.assembly.row_bounds(), slack) if answer is not None else slack
         slack = self.lacking(qp, v) if answer is None else slack
-        slack = np.where(slack > 2.0 * TOLERANCE * self._units, slack, 0.0)
-        if flag == RELAXED and not slack[self._hard].any():
+        rounding = 2.0 * np.where(self._exact, max(TOLERANCE, self._room), TOLERANCE)
+        slack = np.where(slack > rounding * self._units, slack, 0.0)
+        if flag == RELAXED and not (slack[self._hard].any() or report[memory["beyond"]].any()):
             flag = SOLVED  # the rows contradict each other by rounding only
         certificate = replace(certificate, violation=max(certificate.violation, self._broken(qp, v, answer)))
         sound = self._sound(certificate) and self._firm(qp, v, answer)
@@ -354,11 +364,36 @@ class SolvedTick(Buffers):
             bounded, crossed = self._uncrossed(qp)
             if crossed[self._orders == 0].any():
                 return BRAKED, self.rest(qp), None
-            answer = self._relaxation.solve(bounded, self._orders, self._units, self._dof_scales, self._tends())
+            answer, limits = self._with_room(bounded)
             if answer.flag != "failed":
                 answer = self._soft.polished(qp, answer)
-                return RELAXED if crossed.any() or answer.flag == "relaxed" else SOLVED, answer.x, answer
+                return RELAXED if crossed.any() or limits or answer.flag == "relaxed" else SOLVED, answer.x, answer
         return BRAKED, self.rest(qp), None
+
+    def _with_room(self, qp: QP) -> tuple[Relaxed, bool]:
+        """What a QP leads to, and whether limits of motion gave way: rows of closed loops are the last to do so."""
+
+        def solved(qp: QP) -> Relaxed:
+            return self._relaxation.solve(qp, self._orders, self._units, self._dof_scales, self._tends())
+
+        answer, self._room = solved(qp), 0.0
+        for limits in (False, True):
+            if answer.flag == "solved" or (limits and not self._opened(answer)):
+                break
+            self._room, low, high = self.assembly.ease(limits)
+            if self._room == 0.0:
+                break
+            eased = qp.copy()
+            eased.lower[: self._nv], eased.upper[: self._nv] = low[: self._nv], high[: self._nv]
+            eased.lower[qp.n :], eased.upper[qp.n :] = low[self._nv :], high[self._nv :]
+            answer = solved(eased)
+        else:
+            return answer, True
+        return answer, False
+
+    def _opened(self, answer: Relaxed) -> bool:
+        """Whether loops gave way, or there is no answer."""
+        return answer.flag == "failed" or bool(answer.relaxed[self._exact].any())
 
     def _tends(self) -> Array | None:
         """What accelerations tend to where limits of motion give way."""

@@ -33,6 +33,11 @@ NEAR_BY_TORQUES = 3e-3
 BESIDE = 2.5
 #: By torques, how much nearer to its surface than that a foot has to be [1]: below 1 mm its load hardly throws it
 ABOVE = 3.0
+#: How long a foot that is late has pressed on before it counts as standing within all of that [s]: tilted ones may
+STANDS_LATE = 0.25
+#: How far below its surface a foot is sent that has closed, until it bears its load [m]: of other masses than thought
+#: it would stay above the surface, and be thrown at it by that load
+SENT_BELOW = 2e-3
 #: Weight of a contact's force that hands its load over [m^2/s^4 per N^2, of tasks of weight 1]: 1e4 leaves mN
 UNLOADED = 1e4
 #: The same in the air, where it is 0: of the size of other weights, as a tick takes longer where they are far apart
@@ -84,6 +89,7 @@ class LimbMachine:
         self._aim = InputGroup(core_of(items), [(f"{self.name} swing", field, None) for field in fields])
         self._glide = InputGroup(core_of(items), [(f"{self.name} contact", "feedforward", None)])
         self._loading, near = (parts.options.unload if parts.torques else 0.0), parts.options.latch_distance
+        self._presses = parts.torques and not limb.contact.pulls
         self._near = (NEAR_BY_TORQUES if parts.torques else NEAR_BY_RATES) if near is None else near
         self._data = parts.robot.model.createData()
         self.state, self.held, self._since = LimbState.FREE, FREE_LIMB, 0.0
@@ -220,6 +226,9 @@ class LimbMachine:
             self._force.ramp(self._bearing, self._loading)
         elif cause in (Cause.SETTLED, Cause.NO_FOOTHOLD):
             self.moves = self.moves[1:]
+            if cause is Cause.SETTLED and self._presses:
+                # Friction holds it where it landed: a target elsewhere would only load that
+                self._contact.target = self._stood(q, 0.0)
         if state is LimbState.SWINGING and move is not None and move.lands != FREE_LIMB:
             self._target = self._at(move.lands, move.land)
         return state
@@ -240,7 +249,7 @@ class LimbMachine:
             return
         now = pin.updateFramePlacement(model, planned, self._number)
         place = now.translation
-        if self._late > 0.0 and parts.torques and not self._kind.pulls:
+        if self._late > 0.0 and self._presses:
             normal, press = self._target.rotation[:, 2], parts.options.press
             place, rate[:3] = place - press * self._late * normal, rate[:3] - press * normal
         aim = [place]
@@ -295,22 +304,20 @@ class LimbMachine:
     def _there(self, q: Array) -> bool:
         """Whether it is near enough to its foothold to close; a foot that touches, also a little beside it."""
         off, turned = self.off(q)
-        if self._parts.torques and not self._kind.pulls:
+        if self._presses:
             away = self._target.actInv(self._pose(q)).translation
-            off = max(ABOVE * float(away[2]), -float(away[2]), float(np.hypot(away[0], away[1])) / BESIDE)
+            above = ABOVE if self._late < STANDS_LATE else 1.0
+            off = max(above * float(away[2]), -float(away[2]), float(np.hypot(away[0], away[1])) / BESIDE)
         return off <= self._near and turned <= self._parts.options.latch_angle
 
     def _close(self, foothold: int, q: Array) -> None:
         """Its rows are hard."""
         target, inputs = self._target, dict[str, Any]()
         if self._force is not None:
-            if not self._kind.pulls:
-                # Where the foot is, which may be a little beside the plan's foothold; above the surface it goes on down
-                pose = self._pose(q)
-                normal = target.rotation[:, 2]
-                above = max(0.0, float(normal @ (pose.translation - target.translation)))
-                turn = target.rotation if self._kind.fixed == "position" else pose.rotation
-                target = pin.SE3(turn, pose.translation - above * normal)
+            if self._presses:
+                # Where the foot is, which may be a little beside the plan's foothold
+                above = float(target.rotation[:, 2] @ (self._pose(q).translation - target.translation))
+                target = self._stood(q, max(0.0, above + SENT_BELOW) if self.state is LimbState.LATCHING else 0.0)
             slopes, bounds = self.item.numbers(self._footholds[foothold].friction, self._parts.options.friction)
             inputs = {"slopes": slopes, "bounds": bounds}
             if self.state is LimbState.LATCHING:
@@ -324,6 +331,12 @@ class LimbMachine:
             place, self._gripping = self._pose(q).translation, True
             self._closed_at = place, float(np.linalg.norm(place - target.translation))
         self.held, self._late = foothold, 0.0
+
+    def _stood(self, q: Array, down: float) -> pin.SE3:
+        """Pose of the contact frame of a foot where it is, or so far down along its surface's normal [m]."""
+        pose, surface = self._pose(q), self._target.rotation
+        turn = surface if self._kind.fixed == "position" else pose.rotation
+        return pin.SE3(turn, pose.translation - down * surface[:, 2])
 
     def _open(self) -> None:
         """It follows the plan through the air."""

@@ -97,6 +97,17 @@ class FootholdContact(Contact):
         wrenches[0, 4], wrenches[1, 3] = -self.kind.height, self.kind.height
         return wrenches[list(self.axes)]
 
+    def sizes(self, robot: Robot) -> Array:
+        """What the contact bears of each component where it is pressed by the robot's weight, or pulls by nothing, at
+        most that weight: loads are shared in proportion to what contacts bear, and soles are pressed in their middle.
+        """
+        (a, b), most = self.kind.cone(), super().sizes(robot)
+        pressed = 0.0 if self.kind.pulls else min(most[2], getattr(self.kind, "most", np.inf))
+        slopes = a @ self.borne.T
+        rooms = np.full(slopes.shape, np.inf)
+        np.divide((b - pressed * a[:, 2])[:, None], slopes, out=rooms, where=slopes > 0.0)
+        return np.asarray(np.minimum(most, rooms.min(axis=0)))
+
     def limits(self) -> tuple[Input, ...]:
         """``feedforward``, and ``slopes`` and ``bounds`` of the kind."""
         slopes, bounds = self.numbers(np.inf)

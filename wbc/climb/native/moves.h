@@ -141,49 +141,46 @@ static void pose_between(const double *a, const double *b, double part, double *
     move_body(out, twist);
 }
 
-/* The same for limbs on which the body has to give way: all go evenly, and are brought back to their contacts */
-static int follow_whole(const climb_t *c, const int *contact, const double *base, const double *angle, const double *to,
-                        const double *reached) {
-    double pose[12], now[MOST_LIMBS * MOST_ANGLES];
-    const int angles = c->offset[c->limbs];
-    for (int k = 1; k < BETWEEN; k++) {
-        const double part = (double)k / BETWEEN;
-        pose_between(base, to, part, pose);
-        for (int i = 0; i < angles; i++) now[i] = angle[i] + part * (reached[i] - angle[i]);
-        if (!tighten(c, contact, pose, now)) return BREAKS;
-        for (int i = 0; i < angles; i++)
-            if (fabs(now[i] - angle[i] - part * (reached[i] - angle[i])) > JUMP) return BREAKS;
-    }
-    return STANDS;
-}
-
 /* Follows limbs that hold while the body goes from one posture to another, whose angles become what is come to; the slack and
  * clearance there, on contacts `at_last`, are looked at again where these differ. `clear`: whether links of the body and of limbs
  * that hold are to be clear on the way; `far`: what links that touch lack there [m], below 0 */
 static int follow(climb_t *c, const int *contact, const int *at_last, const wish_t *wish, int clear, const double *base,
                   const double *angle, const double *to, double *reached, double *slack, int *which, double *far) {
-    double pose[BETWEEN][12], now[MOST_ANGLES], center[3], way[BETWEEN][MOST_LIMBS * MOST_ANGLES];
+    double pose[BETWEEN][12], now[MOST_ANGLES], center[3], way[BETWEEN][MOST_LIMBS * MOST_ANGLES], last[MOST_LIMBS * MOST_ANGLES];
     placed_t placed[MOST_LIMBS];
     near_t near = {.seen = BODY, .of = EVERYTHING};
-    int other = 0;
-    if (yields(c, contact)) return follow_whole(c, contact, base, angle, to, reached);
+    const wish_t level = {0};
+    const int angles = c->offset[c->limbs];
+    int other = 0, gives = yields(c, contact);
+    memcpy(last, reached, (size_t)angles * sizeof *last);
     for (int k = 1; k < BETWEEN; k++) pose_between(base, to, (double)k / BETWEEN, pose[k]), memset(way[k], 0, sizeof way[k]);
     for (int l = 0; l < c->limbs; l++) {
         if (contact[l] < 0) continue;
         near.seen |= bit_of(l);
         const limb_t *limb = c->limb + l;
-        double *end = reached + c->offset[l];
+        double *end = last + c->offset[l];
         memcpy(now, angle + c->offset[l], (size_t)limb->angles * sizeof *now);
-        for (int k = 1; k <= BETWEEN; k++) {
+        for (int k = 1; k <= BETWEEN && !gives; k++) {
             /* Limbs with angles to spare are led to where they end */
             if (limb->angles > limb->rows)
                 for (int i = 0; i < limb->angles; i++) now[i] += (end[i] - now[i]) / (BETWEEN - k + 1);
-            if (!reach_from(limb, k < BETWEEN ? pose[k] : to, c->foothold + 12 * contact[l], now)) return BREAKS;
+            gives = !reach_from(limb, k < BETWEEN ? pose[k] : to, c->foothold + 12 * contact[l], now);
             if (k < BETWEEN) memcpy(way[k] + c->offset[l], now, (size_t)limb->angles * sizeof *now);
         }
         for (int i = 0; i < limb->angles; i++) other |= fabs(end[i] - now[i]) > 1e-3;
         memcpy(end, now, (size_t)limb->angles * sizeof *now);
     }
+    /* Where limbs cannot follow that all go evenly, and the body gives way */
+    for (int k = 1; k < BETWEEN && gives; k++) {
+        const double part = (double)k / BETWEEN;
+        pose_between(base, to, part, pose[k]);
+        for (int i = 0; i < angles; i++) way[k][i] = angle[i] + part * (reached[i] - angle[i]);
+        if (!tighten_whole(c, contact, &level, pose[k], way[k])) return BREAKS;
+        for (int i = 0; i < angles; i++)
+            if (fabs(way[k][i] - angle[i] - part * (reached[i] - angle[i])) > JUMP) return BREAKS;
+    }
+    if (gives) return STANDS;
+    memcpy(reached, last, (size_t)angles * sizeof *last);
     for (int k = 1; k < BETWEEN && clear; k++) {
         place_all(c, pose[k], way[k], placed, center);
         if ((*far = clearance_near(c, contact, pose[k], placed, which, &near)) < 0.0) return TOUCHES;
@@ -220,6 +217,27 @@ static void keep_apart(wish_t *wish, const int *which, double far) {
     if (!is_avoided(wish, which)) memcpy(wish->avoid[wish->avoided++], which, sizeof wish->avoid[0]);
 }
 
+/* A posture as of posture(), in place, from which limbs that are not kept can be raised with the body as it is: where one cannot, that is
+ * sought in which they are raised, and lowered from there */
+static int posture_to_rise(climb_t *c, const int *contact, const int *kept, const wish_t *given, double *state, double *slack, int *which) {
+    wish_t wish = *given;
+    placed_t placed[MOST_LIMBS];
+    double center[3];
+    const int how = posture(c, contact, &wish, state, state + 12, slack, which);
+    if (how != STANDS || clear_once_up(c, contact, kept, state, 0) >= 0.0) return how;
+    for (int l = 0; l < c->limbs; l++)
+        if (contact[l] >= 0 && contact[l] != kept[l] && c->limb[l].angles >= c->limb[l].rows) wish.raised[l] = RISEN * c->limb[l].length;
+    for (int look = 0; look <= RISING; look++) {
+        if (posture(c, contact, &wish, state, state + 12, slack, which) != STANDS || !tighten(c, contact, given, state, state + 12)) break;
+        place_all(c, state, state + 12, placed, center);
+        *slack = slack_of(c, wish.support, center, wish.slack);
+        if (*slack >= wish.slack) return link_clearance(c, contact, state, placed, which) >= 0.0 ? STANDS : TOUCHES;
+        /* A limb that is lowered takes the centre of mass along */
+        wish.more += wish.slack - *slack;
+    }
+    return NOT_REACHED;
+}
+
 /* A posture near `state`, in place, to which limbs come from `from` on that hold all the time, `held`, and from which those that are
  * not kept rise: links that touch on that way, or once those are up, are kept apart in another posture, if there is one. `strict`:
  * whether limbs have to rise, and links that hold to be clear on the way */
@@ -231,8 +249,7 @@ static int posture_from(climb_t *c, const int *contact, const int *kept, const i
     int first = STANDS, stands = 0, pair[4];
     memcpy(own, state, size);
     for (int look = 0; look <= RISING; look++) {
-        int how = posture(c, contact, &wish, own, own + 12, &least, pair);
-        if (how == STANDS && strict && clear_once_up(c, contact, kept, own, 0) < 0.0) how = NOT_REACHED;
+        int how = strict ? posture_to_rise(c, contact, kept, &wish, own, &least, pair) : posture(c, contact, &wish, own, own + 12, &least, pair);
         const int found = how == STANDS;
         if (found) how = follow(c, held, contact, &wish, strict, from, from + 12, own, own + 12, &least, pair, &far);
         if (how == STANDS || !look) memcpy(state, own, size), memcpy(which, pair, 2 * sizeof *pair), *slack = least;
@@ -275,14 +292,14 @@ static int lift_off(climb_t *c, const int *contact, const int *kept, double want
     memcpy(from, state, size);
     if (*slack >= wanted) {
         if (attempt == LAST_ATTEMPT) return STANDS;
-        if (clear_once_up(c, contact, kept, state, 0) < 0.0) return NOT_REACHED;
-        const double far = clear_once_up(c, contact, kept, state, which), had = *slack;
-        if (far >= 0.0) return STANDS;
-        keep_apart(&wish, which, far);
+        const int rises = clear_once_up(c, contact, kept, state, 0) >= 0.0;
+        const double far = rises ? clear_once_up(c, contact, kept, state, which) : 0.0, had = *slack;
+        if (rises && far >= 0.0) return STANDS;
+        if (rises) keep_apart(&wish, which, far);
         *moves = posture_from(c, contact, kept, contact, &wish, 1, from, state, slack, which) == STANDS &&
                  clear_once_up(c, contact, kept, state, which) >= 0.0;
         if (!*moves) memcpy(state, from, size), *slack = had;
-        return STANDS;
+        return rises || *moves ? STANDS : NOT_REACHED;
     }
     *moves = 1;
     if (attempt) begin_anew(c, contact, touch, attempt, state);

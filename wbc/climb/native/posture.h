@@ -10,6 +10,10 @@
 #define LOOKS 10
 /* Moves below this end the sweeps: what contacts lack then is made up by their limbs [rad, m of the length] */
 #define NEAR_ENOUGH 2e-2
+/* How often a sweep is solved again for angles that would go beyond their limits */
+#define ROUNDS 6
+/* Longest step of a sweep [rad, lengths of the robot] */
+#define LONGEST_SWEEP 0.6
 /* Sweeps end where so many of them leave more than this share of the sum of squared errors of contacts, if that is more than enough
  * [lengths squared] */
 #define STALLED 4
@@ -35,6 +39,7 @@ typedef struct {
     double slack, more, place, turn, rest, pose[12];
     int avoided, avoid[AVOIDED][2]; /* pairs, as of link_clearance, that are kept apart */
     double aside;                   /* how much further than ASIDE [m] */
+    double raised[MOST_LIMBS];      /* how far above its place each contact is wanted [m] */
 } wish_t;
 
 enum { STANDS, NOT_REACHED, NOT_BORNE, TOUCHES, BREAKS };
@@ -167,12 +172,54 @@ static double add_avoided(const climb_t *c, const int *contact, const double *of
     return by * short_of * short_of;
 }
 
+/* The least of x H x / 2 - g x, n x n and positive, within bounds, in place of g: what a round would bring beyond a bound goes to it, and
+ * the others are sought again; a step that is too long is shortened, and cut off there. `unit`: of the first three; 0: H is not positive */
+static int solve_within(int n, const double *H, double *g, const double *low, const double *high, double unit) {
+    double L[MOST_VARIABLES * MOST_VARIABLES], x[MOST_VARIABLES];
+    char out[MOST_VARIABLES] = {0};
+    for (int k = 0; k < n; k++) {
+        out[k] = (low[k] >= 0.0 && g[k] < 0.0) || (high[k] <= 0.0 && g[k] > 0.0);
+        x[k] = 0.0;
+    }
+    for (int round = 0; round < ROUNDS; round++) {
+        double y[MOST_VARIABLES];
+        int beyond = 0;
+        memcpy(L, H, (size_t)(n * n) * sizeof *L), memcpy(y, g, (size_t)n * sizeof *y);
+        for (int i = 0; i < n; i++) {
+            if (!out[i]) continue;
+            for (int k = 0; k < n; k++) {
+                if (!out[k]) y[k] -= (i > k ? H[i * n + k] : H[k * n + i]) * x[i];
+                L[(i > k ? i * n + k : k * n + i)] = 0.0;
+            }
+            L[i * (n + 1)] = 1.0, y[i] = x[i];
+        }
+        if (!solve_positive(n, L, y)) return 0;
+        double longest = 0.0;
+        for (int k = 0; k < n; k++) longest = fmax(longest, fabs(y[k]) / (k < 3 ? unit : 1.0));
+        const int far = longest > LONGEST_SWEEP;
+        for (int k = 0; k < n; k++) {
+            if (far) y[k] *= LONGEST_SWEEP / longest;
+            x[k] = fmin(fmax(y[k], low[k]), high[k]);
+            if (x[k] != y[k]) out[k] = beyond = 1;
+        }
+        if (far || !beyond) break;
+    }
+    memcpy(g, x, (size_t)n * sizeof *g);
+    return 1;
+}
+
+/* Where a contact is wanted */
+static void contact_goal(const climb_t *c, const int *contact, const wish_t *wish, int l, double *goal) {
+    const double *at = c->foothold + 12 * contact[l], normal[3] = {at[2], at[5], at[8]};
+    memcpy(goal, at, 12 * sizeof *goal);
+    along3(at + 9, wish->raised[l], normal, goal + 9);
+}
+
 /* One sweep of least squares; the largest move [m, rad]. `left`: sum of squared errors of the contacts before it [lengths squared] */
 static double sweep(const climb_t *c, const int *contact, const wish_t *wish, double *base, double *angle, placed_t *placed,
                     double *left) {
-    double H[MOST_VARIABLES * MOST_VARIABLES], g[MOST_VARIABLES], center[3];
+    double H[MOST_VARIABLES * MOST_VARIABLES], g[MOST_VARIABLES], center[3], goal[12];
     int start[MOST_LIMBS], n = 6;
-    char out[MOST_VARIABLES] = {0};
     place_all(c, base, angle, placed, center);
     for (int l = 0; l < c->limbs; l++) {
         start[l] = contact[l] < 0 ? -1 : n;
@@ -184,7 +231,8 @@ static double sweep(const climb_t *c, const int *contact, const wish_t *wish, do
     *left = 0.0;
     for (int l = 0; l < c->limbs; l++) {
         if (contact[l] < 0) continue;
-        *left += add_contact(c, l, placed + l, c->foothold + 12 * contact[l], base, start[l], n, H, g);
+        contact_goal(c, contact, wish, l, goal);
+        *left += add_contact(c, l, placed + l, goal, base, start[l], n, H, g);
         for (int k = 0; k < c->limb[l].angles; k++) {
             const double off = angle[c->offset[l] + k] - c->limb[l].rest[k];
             H[(start[l] + k) * (n + 1)] += wish->rest, g[start[l] + k] -= wish->rest * off;
@@ -202,22 +250,17 @@ static double sweep(const climb_t *c, const int *contact, const wish_t *wish, do
         add_bound(c, wish->support->bound[b], wish->slack + wish->more, center, base, placed, start, BEARS, n, H, g);
     for (int k = 0; k < wish->avoided; k++)
         add_avoided(c, contact, 0, wish->avoid[k], ASIDE * c->length + wish->aside, base, placed, start, BEARS, n, H, g);
-    /* Angles at a limit against which they are pulled stay there */
+    /* Angles at a limit against which they are pulled stay there; those that a step would bring beyond one go to it, and the others with
+     * them */
+    double low[MOST_VARIABLES], high[MOST_VARIABLES];
+    for (int k = 0; k < 6; k++) low[k] = -INFINITY, high[k] = INFINITY;
     for (int l = 0; l < c->limbs; l++)
         for (int k = 0; contact[l] >= 0 && k < c->limb[l].angles; k++) {
-            const double now = angle[c->offset[l] + k], pull = g[start[l] + k];
-            if ((now <= c->limb[l].lower[k] && pull < 0.0) || (now >= c->limb[l].upper[k] && pull > 0.0)) out[start[l] + k] = 1;
+            const double now = angle[c->offset[l] + k];
+            low[start[l] + k] = c->limb[l].lower[k] - now, high[start[l] + k] = c->limb[l].upper[k] - now;
         }
-    for (int i = 0; i < n; i++)
-        if (out[i]) {
-            for (int k = 0; k < n; k++) H[(i > k ? i * n + k : k * n + i)] = 0.0;
-            H[i * (n + 1)] = 1.0, g[i] = 0.0;
-        }
-    if (!solve_positive(n, H, g)) return 0.0;
-    double longest = 0.0, moved = 0.0;
-    for (int k = 0; k < n; k++) longest = fmax(longest, k < 3 ? fabs(g[k]) / c->length : fabs(g[k]));
-    const double by = longest > 0.6 ? 0.6 / longest : 1.0;
-    for (int k = 0; k < n; k++) g[k] *= by;
+    if (!solve_within(n, H, g, low, high, c->length)) return 0.0;
+    double moved = 0.0;
     for (int k = 0; k < 6; k++) moved = fmax(moved, k < 3 ? fabs(g[k]) / c->length : fabs(g[k]));
     move_body(base, g);
     for (int l = 0; l < c->limbs; l++)
@@ -236,35 +279,44 @@ static int yields(const climb_t *c, const int *contact) {
 }
 
 /* Largest row of the errors of contacts at their places, turns times a length [m] */
-static double most_open(const climb_t *c, const int *contact, const double *base, const double *angle) {
+static double most_open(const climb_t *c, const int *contact, const wish_t *wish, const double *base, const double *angle) {
     placed_t placed;
-    double r[6], E[6][6], most = 0.0;
+    double r[6], E[6][6], goal[12], most = 0.0;
     for (int l = 0; l < c->limbs; l++) {
         if (contact[l] < 0) continue;
         place_steps(c->limb + l, base, angle + c->offset[l], &placed);
-        contact_error(c->limb + l, placed.tip, c->foothold + 12 * contact[l], r, E);
+        contact_goal(c, contact, wish, l, goal);
+        contact_error(c->limb + l, placed.tip, goal, r, E);
         for (int i = 0; i < c->limb[l].rows; i++) most = fmax(most, fabs(r[i]));
     }
     return most;
 }
 
-/* Brings all contacts to where they are wanted: by their limbs alone; by the body too where limbs have fewer angles than rows, or
- * end at a limit so near that it gives way by as little; whether they are */
-static int tighten(const climb_t *c, const int *contact, double *base, double *angle) {
-    if (!yields(c, contact)) {
-        int reached = 1;
-        for (int l = 0; l < c->limbs; l++)
-            if (contact[l] >= 0 && !reach_from(c->limb + l, base, c->foothold + 12 * contact[l], angle + c->offset[l])) reached = 0;
-        if (reached || most_open(c, contact, base, angle) > GIVES * c->length) return reached;
-    }
-    const wish_t none = {0};
+/* Brings all contacts to where they are wanted by limbs and body, which move as little as that takes; whether they are */
+static int tighten_whole(const climb_t *c, const int *contact, const wish_t *wish, double *base, double *angle) {
+    wish_t none = {0};
     placed_t placed[MOST_LIMBS];
     double left;
+    memcpy(none.raised, wish->raised, sizeof none.raised);
     for (int k = 0; k < ITERATIONS; k++) {
         sweep(c, contact, &none, base, angle, placed, &left);
-        if (most_open(c, contact, base, angle) < 0.5 * EXACT * c->length) return 1;
+        if (most_open(c, contact, &none, base, angle) < 0.5 * EXACT * c->length) return 1;
     }
     return 0;
+}
+
+/* The same by limbs alone; by the body too where limbs have fewer angles than rows, or end at a limit so near that it gives way by as
+ * little */
+static int tighten(const climb_t *c, const int *contact, const wish_t *wish, double *base, double *angle) {
+    int reached = 1;
+    for (int l = 0; l < c->limbs && !yields(c, contact); l++) {
+        double goal[12];
+        if (contact[l] < 0) continue;
+        contact_goal(c, contact, wish, l, goal);
+        reached = reach_from(c->limb + l, base, goal, angle + c->offset[l]) && reached;
+    }
+    if (!yields(c, contact) && (reached || most_open(c, contact, wish, base, angle) > GIVES * c->length)) return reached;
+    return tighten_whole(c, contact, wish, base, angle);
 }
 
 /* Whether a pair is kept apart already, or there is no place for one more */
@@ -289,7 +341,7 @@ static int posture(climb_t *c, const int *contact, const wish_t *given, double *
             if (left > CLOSE && left > STALLS * before) break;
             before = left;
         }
-        if (!tighten(c, contact, base, angle)) return NOT_REACHED;
+        if (!tighten(c, contact, wish, base, angle)) return NOT_REACHED;
         place_all(c, base, angle, placed, center);
         *slack = slack_of(c, wish->support, center, wish->slack);
         how = NOT_BORNE;

@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from wbc.retarget.body import BodyError, find_body
-from wbc.retarget.clip import Array, ancestors
-from wbc.retarget.sources.layouts import side_sines
+from wbc.retarget.clip import Array, Skeleton, ancestors
+from wbc.retarget.sources.layouts import to_the_left
 from wbc.retarget.sources.recorded import Recorded
 from wbc.retarget.words import numbers_of
 
@@ -36,18 +36,12 @@ UPRIGHT = 0.75
 OTHER_SIZE = 0.8
 #: Cost of an axis along which the head is not above the feet
 NOT_ABOVE = 0.7
-#: Cost of an axis that is not the usual one of the format
-NOT_USUAL = 0.15
-#: Cost of an axis that is not that of the rest pose
-NOT_AT_REST = 0.2
-#: Axes whose costs are closer than this are told apart only by what is usual
+#: Which of two axes whose costs are closer than this is up is not sure
 UNSURE = 0.1
 #: Time over which what stands is measured [s]
 STANDING_TIME = 0.1
 #: What moves less than this share of the body's size a second stands [1/s]
 STANDING_SPEED = 0.12
-#: Frames that are looked at, at most
-FRAMES = 600
 
 
 class FileAxes:
@@ -59,7 +53,9 @@ class FileAxes:
     """
 
     def __init__(self, clip: Recorded) -> None:
-        self.clip, skeleton = clip, clip.skeleton
+        self.clip, skeleton = clip, None
+        if clip.offsets is not None:
+            skeleton = Skeleton(tuple(clip.names), tuple(clip.parents), clip.offsets, tuple(clip.ends))
         spans = np.nanmax(clip.points, axis=1) - np.nanmin(clip.points, axis=1)
         self.size = float(np.nanmedian(np.linalg.norm(spans, axis=1)))
         self.rest = None if skeleton is None else skeleton.rest
@@ -84,8 +80,7 @@ class FileAxes:
         """The axis of the file that is up; a note says it where it is not z, or not sure.
 
         Each axis has a cost: how far what stands still is spread along it and lies above the lowest points, as shares
-        of the body's size, and how far the head is from being above the feet. What is usual in the format decides near
-        ties.
+        of the body's size, and how far the head is from being above the feet.
         """
         clip, points, size = self.clip, self.clip.points, self.size or 1.0
         above = np.zeros(3)
@@ -95,18 +90,16 @@ class FileAxes:
             above = above / max(float(np.linalg.norm(above)), 1e-9)
         # Places of feet, or of all points where no feet are known, while they stand still
         low = points[:, self._feet or list(range(len(clip.names)))]
-        lag, every = max(1, min(len(low) - 1, round(STANDING_TIME * clip.rate))), max(1, len(low) // FRAMES)
-        speed = np.linalg.norm(low[lag::every] - low[:-lag:every], axis=2) * clip.rate / lag
-        standing = low[:-lag:every][speed < STANDING_SPEED * size]
-        costs: dict[str, float] = {}
+        lag = max(1, min(len(low) - 1, round(STANDING_TIME * clip.rate)))
+        standing = low[:-lag][np.linalg.norm(low[lag:] - low[:-lag], axis=2) * clip.rate / lag < STANDING_SPEED * size]
+        costs = dict[str, float]()
         for name, to_world in TO_Z_UP.items():
             up = to_world[2]
             cost = NOT_ABOVE * (1.0 - float(above @ up))
             if len(standing):
                 here = standing @ up
                 cost += (float(np.std(here)) + float(np.mean(here) - np.nanpercentile(points @ up, 2.0))) / size
-            unlikely = NOT_USUAL * (clip.usual not in ("", name)) + NOT_AT_REST * (self.rest_up not in ("", name))
-            costs[name] = cost + unlikely
+            costs[name] = cost
         best, second = sorted(costs, key=lambda name: costs[name])[:2]
         doubt = "" if costs[second] - costs[best] > UNSURE else ", which is not sure: give up= where that is wrong"
         clip.notes += [f"{best} is up in the file{doubt}"] if best != "z" or doubt else []
@@ -114,10 +107,9 @@ class FileAxes:
 
     def is_mirrored(self, up: str) -> bool:
         """Whether left and right are the wrong way round: a file of left-handed axes."""
-        sines = side_sines(self.clip.names, self.clip.points, TO_Z_UP[up][2])
-        sines = sines[np.isfinite(sines)]
+        lefts = to_the_left(self.clip.names, self.clip.points, TO_Z_UP[up][2])
         # In nearly all frames: hips and feet may be across each other for a moment
-        return bool(sines.size and np.mean(sines < -0.5) > 0.9)
+        return bool(lefts.size and np.mean(lefts < 0.0) > 0.9)
 
     def find_unit(self, up: str) -> tuple[str, float]:
         """Name of the file's unit, "" where none makes it a body's size, and the size of the body in it."""

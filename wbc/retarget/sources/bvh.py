@@ -12,8 +12,6 @@ from wbc.rotations import exponential
 
 #: Axes of channels, by their first letter
 AXES = {"x": 0, "y": 1, "z": 2}
-#: Positions of a joint below this share of its offset are counted from the offset, not from the parent
-NO_MOVE = 0.1
 #: Lines that are not blank: number and words
 Lines = list[tuple[int, list[str]]]
 #: Of each channel: its joint, whether it turns it, and about or along which axis
@@ -38,12 +36,6 @@ def read_bvh(path: pathlib.Path) -> Recorded:
             own[:, joint] = own[:, joint] @ exponential(np.outer(np.radians(column), np.eye(3)[axis]))
         else:
             moves.setdefault(joint, np.tile(offsets[joint], (len(table), 1)))[:, axis] = column
-    for joint, move in moves.items():
-        size = float(np.linalg.norm(offsets[joint]))
-        known = move[np.isfinite(move).all(axis=1)]
-        if clip.parents[joint] >= 0 and len(known) and np.median(np.linalg.norm(known, axis=1)) < NO_MOVE * size:
-            move += offsets[joint]
-            clip.notes.append(f"positions of {clip.names[joint]} are counted from its offset")
     return clip.place(path, own, moves)
 
 
@@ -84,7 +76,7 @@ def _hierarchy(path: pathlib.Path, lines: Lines) -> tuple[Recorded, Channels]:
     notes: list[str] = []
     names = unlike(names, notes)
     points = np.zeros((0, len(names), 3))
-    return Recorded(names, parents, points, offsets=np.array(offsets), ends=ends, usual="y", notes=notes), channels
+    return Recorded(names, parents, points, offsets=np.array(offsets), ends=ends, notes=notes), channels
 
 
 def _motion(path: pathlib.Path, lines: Lines, columns: int, clip: Recorded) -> Array:

@@ -19,8 +19,6 @@ KEY = 0x50
 MOST = 0xFFFF
 #: Size of a block, in which files are padded [bytes]
 BLOCK = 512
-#: Units of C3D files [m]
-LENGTHS = {"m": 1.0, "meter": 1.0, "meters": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "inch": 0.0254, "ft": 0.3048}
 
 
 def read_c3d(path: pathlib.Path) -> Recorded:
@@ -42,15 +40,13 @@ def read_c3d(path: pathlib.Path) -> Recorded:
         # A parameter holds 255 labels: LABELS2 goes on where it ends
         more = itertools.takewhile(lambda key: key in about, (f"LABELS{k}" for k in itertools.count(2)))
         labels = [label.strip() for key in ("LABELS", *more) for label in about[key]["value"]]
-        units = about["UNITS"]["value"]
         rate = float(np.ravel(about["RATE"]["value"])[0])
     except (OSError, RuntimeError, ValueError, KeyError, IndexError, MemoryError) as error:
         raise no_clip(path, f"no C3D file that can be read, or it is cut off: {error}") from error
     names = [labels[k] if k < len(labels) and labels[k] else f"marker{k + 1}" for k in range(points.shape[1])]
     # A marker that is lost is NaN, or all zeros where the software wrote no residual
     clip = of_points(path, np.where((points == 0.0).all(axis=2, keepdims=True), np.nan, points), names)
-    clip.rate, clip.usual = rate, "z"
-    clip.unit = LENGTHS.get(units[0].strip().lower(), 0.0) if units else 0.0
+    clip.rate = rate
     # ezc3d counts the frames that are there; the header has the numbers of the first and last one
     used, analog, first, last, _, scale, block = struct.unpack("<HHHHHfH", start[2:18])
     frames = len(points)

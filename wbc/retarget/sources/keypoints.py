@@ -13,7 +13,6 @@ import numpy as np
 from wbc import validation
 from wbc.errors import ShapeError
 from wbc.retarget.clip import Array, listed
-from wbc.retarget.sources.axes import UNITS
 from wbc.retarget.sources.layouts import LAYOUTS, best_layout, parents_by_name
 from wbc.retarget.sources.recorded import Recorded, first_of, no_clip, rate_in, text_of, unlike
 
@@ -26,7 +25,7 @@ NAMES = ("names", "joint_names", "labels", "joints_names", "marker_names", "bone
 #: With numbers of parents
 PARENTS = ("parents", "joint_parents", "parent_indices")
 #: The end of a column's name that says which coordinate it is
-COLUMN = re.compile(r"^(.*?)[\s_.:\-\[(]*([xyzXYZ])[\])]?\s*(?:[\[(](mm|cm|m)[\])])?$")
+COLUMN = re.compile(r"^(.*?)[\s_.:\-\[(]*([xyzXYZ])[\])]?\s*(?:[\[(](?:mm|cm|m)[\])])?$")
 #: Columns of time
 TIMES = ("t", "time", "time [s]", "time_s", "timestamp", "seconds")
 #: Columns that are left out
@@ -53,8 +52,6 @@ def read_npz(path: pathlib.Path, data: dict[str, Any], names: Names) -> Recorded
             clip.parents = np.maximum(given, -1).astype(int).tolist()
         else:
             clip.notes.append("parents that are no numbers of joints before their children are left out")
-    if "unit" in data:
-        clip.notes.append(f"the file's unit is {data['unit']}")
     return clip
 
 
@@ -66,22 +63,18 @@ def read_csv(path: pathlib.Path, names: Names) -> Recorded:
     except csv.Error as error:
         raise no_clip(path, f"no table: {error}") from error
     header = [cell.strip() for cell in rows[0]] if rows else []
-    columns, other, clock, unit = dict[str, dict[str, int]](), list[str](), list[int](), 0.0
+    places: dict[tuple[str, str], int] = {}
     for number, title in enumerate(header):
         match = COLUMN.match(title)
-        if match and match[1].strip():
-            if columns.setdefault(match[1].strip(), {}).setdefault(match[2].lower(), number) != number:
-                raise no_clip(path, f"two columns {title}")
-            unit = UNITS[match[3]][0] if match[3] else unit
-        elif title.lower() in TIMES:
-            clock.append(number)
-        elif title.lower() not in COUNTERS:
-            other.append(title)
-    joints = [name for name, axes in columns.items() if len(axes) == 3]
-    other += [name for name in columns if name not in joints]
+        name = match[1].strip() if match else ""
+        if match and name and places.setdefault((name, match[2].lower()), number) != number:
+            raise no_clip(path, f"two columns {title}")
+    joints = [name for name, axis in places if axis == "x" and (name, "y") in places and (name, "z") in places]
     if not joints:
         raise no_clip(path, f"no header with names such as LeftFoot_x, LeftFoot_y, LeftFoot_z: {', '.join(header[:6])}")
-    used, table = [columns[name][axis] for name in joints for axis in "xyz"] + clock[:1], list[list[float]]()
+    clock = [number for number, title in enumerate(header) if title.lower() in TIMES][:1]
+    used, table = [places[name, axis] for name in joints for axis in "xyz"] + clock, list[list[float]]()
+    other = [title for number, title in enumerate(header) if number not in used and title.lower() not in COUNTERS]
     given = [(number, row) for number, row in enumerate(rows[1:], 2) if row]
     cut = len(given) > 1 and len(given[-1][1]) < len(header)
     for number, row in given[: len(given) - cut]:
@@ -91,9 +84,8 @@ def read_csv(path: pathlib.Path, names: Names) -> Recorded:
             raise no_clip(path, f"line {number}: {error}") from error
     values = np.array(table).reshape(-1, len(used))
     clip = of_points(path, values[:, : 3 * len(joints)], joints if names is None else names)
-    clip.notes += [f"columns that are no points: {listed(other, 6)}"] if other else []
+    clip.notes += [f"columns that are no points: {listed(other)}"] if other else []
     clip.notes += ["the file is cut off: its last line is left out"] if cut else []
-    clip.unit = unit
     if clock:
         steps = np.diff(values[:, -1])
         step = float(np.nanmedian(steps)) if np.isfinite(steps).any() else np.nan

@@ -118,31 +118,24 @@ def best_layout(points: Array) -> str:
         lengths = np.stack([np.linalg.norm(frames[:, a] - frames[:, b], axis=1) for a, b in bones], axis=1)
         spread = np.nanmean(np.nanstd(lengths, axis=0)) + 1e-3 * np.nanmean(lengths)
         up = [frames[:, numbers].mean(axis=1) for part in ("head", "hindfoot") if (numbers := numbers_of(names, part))]
-        sines = side_sines(names, frames, up[0] - up[1]) if len(up) == 2 else np.zeros(0)
-        mirrored = bool(np.isfinite(sines).any() and np.nanmean(sines) < 0.0)
+        lefts = to_the_left(names, frames, up[0] - up[1]) if len(up) == 2 else np.zeros(0)
+        mirrored = bool(np.isfinite(lefts).any() and np.nanmean(lefts) < 0.0)
         return round(float(spread / max(float(np.nanmax(lengths)), 1e-9)), 6), mirrored
 
     return min((name for name in LAYOUTS if len(LAYOUTS[name].names) == points.shape[1]), key=cost, default="")
 
 
-def side_sines(names: Sequence[str], points: Array, up: Array) -> Array:
-    """Sines of the turns from where the feet point to the line from the right hip to the left, about a direction that
-    is up [3] or [frames, 3]: 1 of a person who stands, -1 in a mirror [frames]; empty without names of hips and feet.
+def to_the_left(names: Sequence[str], points: Array, up: Array) -> Array:
+    """How far the left hip is to the left of the right one as the feet point, times the lengths of these, about a
+    direction that is up [3] or [frames, 3]: below 0 in a mirror [frames]; empty without names of hips and feet.
     """
     hips, toes, heels = ([numbers_of(names, part, side) for side in (1, -1)] for part in ("hip", "toe", "hindfoot"))
     heels = [[k for k in own if k not in toe] for own, toe in zip(heels, toes, strict=True)]
     if not all((*hips, *toes, *heels)):
         return np.zeros(0)
-
-    def level(vectors: Array) -> Array:
-        vectors = vectors - np.sum(vectors * z, axis=-1, keepdims=True) * z
-        size = np.linalg.norm(vectors, axis=1, keepdims=True)
-        return np.asarray(vectors / np.where(size > 0.0, size, np.nan))
-
-    z = up / np.maximum(np.linalg.norm(up, axis=-1, keepdims=True), 1e-12)
     left, right = (points[:, own].mean(axis=1) for own in hips)
     feet = [points[:, toe].mean(axis=1) - points[:, heel].mean(axis=1) for toe, heel in zip(toes, heels, strict=True)]
-    return np.asarray(np.sum(np.cross(level(feet[0] + feet[1]), level(left - right)) * z, axis=1))
+    return np.asarray(np.sum(np.cross(feet[0] + feet[1], left - right) * up, axis=1))
 
 
 def parents_by_name(names: Sequence[str]) -> list[int]:

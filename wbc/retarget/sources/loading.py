@@ -23,13 +23,8 @@ from wbc.retarget.sources.smpl import has_poses, read_smpl
 
 #: Suffixes of files that are read
 CLIP_SUFFIXES = (".bvh", ".c3d", ".npz", ".npy", ".csv", ".pkl", ".pt")
-#: What a file that is not read is converted with
-CONVERTED = {
-    ".fbx": "FBX is not read: convert it to BVH, in Blender by File > Import > FBX, then Export > Motion Capture",
-    ".trc": "TRC is not read: save it as C3D or as csv with a header of names",
-    **dict.fromkeys((".glb", ".gltf"), "glTF is not read: convert it to BVH in Blender"),
-    **dict.fromkeys((".asf", ".amc"), "ASF and AMC are not read: convert them to BVH"),
-}
+#: Suffixes of clips that other programs convert
+CONVERTED = (".fbx", ".glb", ".gltf", ".trc", ".asf", ".amc")
 #: Least frames a second [Hz]
 SLOWEST = 10.0
 #: Most frames a second [Hz]
@@ -38,14 +33,6 @@ FASTEST = 1000.0
 WHOLE = 2e-3
 #: What lies this far below the ground is raised onto it [m]
 BELOW = 0.15
-#: The lowest point this far above zero is said [m]
-ABOVE = 0.3
-#: A unit that a file says is not believed where the body's size says another, by this factor
-OTHER_UNIT = 5.0
-#: Bones shorter than this are said to have no length [m]
-NO_LENGTH = 1e-4
-#: Names of joints in a note, at most
-JOINTS_NAMED = 6
 
 
 def load_clip(
@@ -88,13 +75,11 @@ def load_clip(
 def _read(file: pathlib.Path, body_model: str | os.PathLike[str] | None, names: Names) -> Recorded:
     kind = file.suffix.lower()
     if kind in CONVERTED:
-        raise no_clip(file, CONVERTED[kind])
+        raise no_clip(file, f"{kind} is not read: convert it to BVH, in Blender by File > Import, then File > Export")
     if kind not in CLIP_SUFFIXES:
         raise UnknownNameError("clip", file.suffix or str(file), CLIP_SUFFIXES)
     if not validation.is_file("clip", file):
         raise no_clip(file, validation.no_such(file))
-    if file.stat().st_size == 0:
-        raise no_clip(file, "the file is empty")
     if kind == ".csv":
         return read_csv(file, names)
     if kind in (".bvh", ".c3d"):
@@ -137,19 +122,21 @@ def _finished(recorded: Recorded, name: str, up: str | None, unit: str | float |
     if turns is None:
         points = mend_swaps(points, names, rate, notes)
     seen = recorded.seen if recorded.seen is not None else np.asarray(np.isfinite(points).all(axis=2))
-    points = _on_the_ground(fill_gaps(points, parents, names, rate, notes), notes)
+    points = fill_gaps(points, parents, names, rate, notes)
+    lowest = float(np.percentile(points[:, :, 2].min(axis=1), 5.0))
+    if lowest < -BELOW:
+        # As of a root that is the origin
+        notes.append(f"raised by {-lowest:.3g} m: its lowest points were below z = 0")
+        points = points - np.array([0.0, 0.0, lowest])
     if turns is None and parents.count(-1) > 1 and (made := joined(names, points, seen)) is not None:
         names, parents, points, seen = made
         notes.append("hips, knees and all other joints are in the middle of markers of theirs")
     if recorded.offsets is None or turns is None:
         offsets = _offsets(points, parents)
     else:
-        of_rest = mirror @ TO_Z_UP[recorded.rest_up or axes.rest_up or up]
+        of_rest = mirror @ TO_Z_UP[axes.rest_up or up]
         offsets = recorded.offsets @ of_rest.T * length
         turns = mirror @ to_world @ turns @ of_rest.T
-    sizes = np.linalg.norm(offsets, axis=1)
-    short = [names[k] for k, parent in enumerate(parents) if parent >= 0 and sizes[k] < NO_LENGTH]
-    notes += [f"bones without length end at {listed(short, JOINTS_NAMED)}"] if short else []
     ends = tuple(recorded.ends) or (False,) * len(names)
     return Clip(Skeleton(tuple(names), tuple(parents), offsets, ends), rate, points, turns, seen, name, tuple(notes))
 
@@ -160,17 +147,11 @@ def _unit(axes: FileAxes, up: str, given: str | float | None) -> float:
         return UNITS[validation.one_of("unit", given, UNITS)][0]
     if given is not None:
         return validation.scalar("unit", given, low=1e-6, high=1e3, unit="m")
-    said, (name, size) = axes.clip.unit, axes.find_unit(up)
-    length, whole_name, _ = UNITS[name or "m"]
-    if not (name or said):
+    name, size = axes.find_unit(up)
+    if not name:
         raise RangeError("unit", size, "the body's size in the file fits no unit; give unit= of m, cm, mm, in or ft")
-    # Some files say a unit that they are not in; neighbours in size are left as they say
-    if said and (not name or max(length / said, said / length) <= OTHER_UNIT):
-        return said
-    if said:
-        wrong = f"the file says units of {said:g} m, which makes a body of {size * said:.3g} m"
-        axes.clip.notes.append(f"{wrong}: taken as {whole_name}")
-    elif name != "m":
+    length, whole_name, _ = UNITS[name]
+    if name != "m":
         axes.clip.notes.append(f"its unit is {whole_name}: the body is {size:.4g} of them")
     return length
 
@@ -185,26 +166,13 @@ def _without_unseen(recorded: Recorded, name: str) -> None:
         above = [nearest_above(recorded.parents, joint, kept) for joint in kept]
         recorded.parents = [kept.index(joint) if joint >= 0 else -1 for joint in above]
         recorded.names, recorded.points = [recorded.names[joint] for joint in kept], recorded.points[:, kept]
-        recorded.notes.append(f"never seen, and left out: {listed(gone, JOINTS_NAMED)}")
-
-
-def _on_the_ground(points: Array, notes: list[str]) -> Array:
-    """Points that are not far below z = 0, as those of a root at the origin are."""
-    lowest, least = float(np.percentile(points[:, :, 2].min(axis=1), 5.0)), float(points[:, :, 2].min())
-    if lowest < -BELOW:
-        notes.append(f"raised by {-lowest:.3g} m: its lowest points were below z = 0")
-        return np.asarray(points - np.array([0.0, 0.0, lowest]))
-    notes += [f"its lowest point is {least:.3g} m above z = 0"] if least > ABOVE else []
-    return points
+        recorded.notes.append(f"never seen, and left out: {listed(gone)}")
 
 
 def _offsets(points: Array, parents: list[int]) -> Array:
     """Offsets of a skeleton whose file has none: bones of median lengths, as in the frame in which it is tallest."""
-    tallest = int(np.argmax(np.ptp(points[:, :, 2], axis=1)))
-    offsets: Array = points[tallest].copy()
-    for joint, parent in enumerate(parents):
-        if parent >= 0:
-            bone = points[:, joint] - points[:, parent]
-            length, size = float(np.median(np.linalg.norm(bone, axis=1))), float(np.linalg.norm(bone[tallest]))
-            offsets[joint] = bone[tallest] * (length / size if size > 0.0 else 1.0)
-    return offsets
+    tallest, above = int(np.argmax(np.ptp(points[:, :, 2], axis=1))), np.array(parents)[:, None]
+    bones = np.where(above < 0, points, points - points[:, parents])
+    sizes = np.linalg.norm(bones, axis=2, keepdims=True)
+    ratios = np.where(above < 0, 1.0, np.median(sizes, axis=0) / np.maximum(sizes[tallest], 1e-12))
+    return np.asarray(bones[tallest] * ratios)

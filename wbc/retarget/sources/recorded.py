@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation, Slerp
+from scipy.spatial.transform import Rotation
 
 from wbc.errors import ClipFileError
-from wbc.retarget.clip import Array, Marks, Skeleton
+from wbc.retarget.clip import Array, Marks
 from wbc.retarget.sources.mending import between
+from wbc.rotations import continuous_quaternions
 
 #: Keys of frames a second in files of arrays
 RATES = ("rate", "fps", "mocap_framerate", "mocap_frame_rate", "frequency", "sample_rate")
@@ -31,9 +32,6 @@ class Recorded:
         turns: rotations from the rest pose, from its axes to the file's [frames, joints, 3, 3]; None: points alone.
         ends: joints that only end a bone.
         seen: whether a point was there [frames, joints]; None: where it is not NaN.
-        unit: length of the file's unit [m]; 0 where the file does not say.
-        usual: the axis that is usually up in such files; "" where there is none.
-        rest_up: the axis that is up in the rest pose; "" where that is the file's.
         notes: what was found.
     """
 
@@ -45,17 +43,7 @@ class Recorded:
     turns: Array | None = None
     ends: list[bool] = field(default_factory=list)
     seen: Marks | None = None
-    unit: float = 0.0
-    usual: str = ""
-    rest_up: str = ""
     notes: list[str] = field(default_factory=list)
-
-    @property
-    def skeleton(self) -> Skeleton | None:
-        """In its rest pose, along its axes; None where there is none."""
-        if self.offsets is None:
-            return None
-        return Skeleton(tuple(self.names), tuple(self.parents), self.offsets, tuple(self.ends))
 
     def place(self, path: pathlib.Path, own: Array, moves: dict[int, Array]) -> Recorded:
         """Points and rotations of its tree; numbers that are missing are filled in between their neighbours.
@@ -82,10 +70,9 @@ class Recorded:
                 raise no_clip(path, f"a channel of {self.names[joint]} has no number in any frame")
             if good.size < len(own):
                 points[:, joint] = between(points[:, joint])
-                # A last rotation once more, since one alone has nothing between
-                known = Rotation.from_matrix(own[[*good, good[-1]], joint])
-                inside = np.clip(np.arange(len(own)), good[0], good[-1])
-                turns[:, joint] = Slerp([*good, good[-1] + 1], known)(inside).as_matrix()
+                known = np.full((len(own), 4), np.nan)
+                known[good] = continuous_quaternions(Rotation.from_matrix(own[good, joint]).as_quat())
+                turns[:, joint] = Rotation.from_quat(between(known)).as_matrix()
             if parent >= 0:
                 above = turns[:, parent]
                 turns[:, joint] = above @ turns[:, joint]

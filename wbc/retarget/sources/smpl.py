@@ -67,8 +67,7 @@ def read_smpl(path: pathlib.Path, data: Any, body_model: pathlib.Path | None) ->
     if len(moves) != frames:
         raise no_clip(path, f"{len(moves)} places of the root for {frames} frames")
     clip = Recorded(
-        list(layout.names), parents, moves, rate_in(data), offsets, ends=[False] * used, unit=1.0, usual="z",
-        rest_up="y", notes=notes,
+        list(layout.names), parents, moves, rate_in(data), offsets, ends=[False] * used, notes=notes,
     )  # fmt: skip
     return clip.place(path, own, {0: offsets[0] + moves})
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import pathlib
+import xml.etree.ElementTree as ElementTree
 from functools import cached_property
 from typing import Any
 
@@ -79,7 +80,7 @@ class Mesh:
 
 
 def read_mesh(path: pathlib.Path, scale: Array) -> Mesh:
-    """The mesh in a file that Coal's loader reads (STL, OBJ, DAE, ...).
+    """The mesh in a file that Coal's loader reads (STL, OBJ, DAE, ...), in metres where a DAE says what its unit is.
 
     Raises:
         RobotFileError: missing, unreadable or empty. MissingPackageError: Coal is not installed.
@@ -92,13 +93,28 @@ def read_mesh(path: pathlib.Path, scale: Array) -> Mesh:
         raise extras.missing("coal", "coal", "reading meshes") from error
     try:
         with captured_stderr() as noise:
-            loaded = coal.MeshLoader().load(str(path), scale)
+            loaded = coal.MeshLoader().load(str(path), scale * _metres(path))
     except PARSER_ERRORS as error:
         raise RobotFileError("mesh", str(path), noise.reason or " ".join(str(error).split())) from error
     mesh = mesh_of(loaded)
     if mesh.vertices.ndim != 2 or len(mesh.vertices) == 0 or not np.isfinite(mesh.vertices).all():
         raise RobotFileError("mesh", str(path), "no finite vertices in it")
     return mesh
+
+
+def _metres(path: pathlib.Path) -> float:
+    """The unit of a Collada file, which Coal's loader takes for 1 [m]."""
+    if path.suffix.lower() != ".dae":
+        return 1.0
+    try:
+        asset = next((part for _, part in ElementTree.iterparse(path) if part.tag.endswith("}asset")), None)
+        unit = None if asset is None else asset.find("{*}unit")
+        metres = 1.0 if unit is None else float(unit.get("meter", "1"))
+    except (ElementTree.ParseError, ValueError) as error:
+        raise RobotFileError("mesh", str(path), f"its unit cannot be read: {error}") from error
+    if not 0.0 < metres < np.inf:
+        raise RobotFileError("mesh", str(path), f"its unit is {metres:g} m")
+    return metres
 
 
 def mesh_of(geometry: Any) -> Mesh:

@@ -11,7 +11,7 @@ import numpy as np
 from wbc.errors import RangeError, RobotFileError
 from wbc.multibody import own
 from wbc.robot.sources.description import Description, Mimic, moving_freely, root_joint, with_base
-from wbc.robot.sources.urdf_checks import SINGLE, Remarks, axis_of, check_links, check_tree, number
+from wbc.robot.sources.urdf_checks import SINGLE, Remarks, axis_of, check_elements, check_links, check_tree, number
 from wbc.robot.sources.urdf_model import NotUrdf, UrdfElements, build_model
 from wbc.validation import Array
 
@@ -51,7 +51,9 @@ def read_urdf(
     except NotUrdf as error:
         raise RobotFileError("robot", str(path), f"it is no URDF: {error.reason}") from error
     check_links(path, tree, remarks)
+    check_elements(tree, remarks)
     mimics = _mimics(joints, leaders, model, remarks)
+    accelerations = _accelerations(joints, remarks)
     for name in unlimited:
         index = int(model.idx_qs[model.getJointId(name)])
         for bound, none in (("lowerPositionLimit", -np.inf), ("upperPositionLimit", np.inf)):
@@ -71,6 +73,7 @@ def read_urdf(
         whole,
         kind,
         mimics,
+        acceleration=accelerations,
         notes=remarks.said(),
         source=str(path),
         undriven=undriven,
@@ -86,6 +89,25 @@ def _leaders(joints: Joints, corrections: dict[str, str]) -> dict[str, str]:
         for name, joint in joints.items()
         if (mimic := joint.find("mimic")) is not None and joint.get("type") != "fixed"
     }
+
+
+def _accelerations(joints: Joints, remarks: Remarks) -> dict[str, float]:
+    """Limits of acceleration and deceleration, of which the lesser counts, of joints with one coordinate (URDF 1.2)."""
+    out, jerks = dict[str, float](), list[str]()
+    for name, joint in joints.items():
+        limit = joint.find("limit")
+        if limit is None or joint.get("type") not in SINGLE:
+            continue
+        given = [number(limit, key, np.nan) for key in ("acceleration", "deceleration") if limit.get(key) is not None]
+        if any(not 0.0 < value < np.inf for value in given):
+            remarks.add("acceleration limits", f"an acceleration of {name} is not above 0: unlimited")
+        elif given:
+            out[name] = min(given)
+        if limit.get("jerk") is not None:
+            jerks.append(name)
+    if jerks:
+        remarks.add("jerk", f"limits of jerk are not held: {', '.join(jerks)}")
+    return out
 
 
 def _mimics(joints: Joints, leaders: dict[str, str], model: own.Model, remarks: Remarks) -> tuple[Mimic, ...]:

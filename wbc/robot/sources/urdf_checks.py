@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import difflib
 import logging
 import pathlib
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterable
 
 import numpy as np
 
@@ -24,6 +26,24 @@ _LONGEST = 1e150
 MOMENT_DIGITS = 1e-2
 #: What is less than so much of the largest moment in the file moves nothing otherwise: 1e-6 kg m^2 of empty links
 FELT = 1e-4
+#: Elements that are read, of the robot, of a link and of a joint
+_READ = {
+    "robot": ("link", "joint"),
+    "link": ("inertial", "visual", "collision"),
+    "joint": ("parent", "child", "origin", "axis", "limit", "dynamics", "mimic", "safety_controller"),
+}
+#: Those that say nothing of how a robot moves and weighs
+_NO_MECHANICS = ("material", "transmission", "gazebo", "sensor", "ros2_control", "calibration")
+#: Attributes of the elements of a joint
+_ATTRIBUTES = {
+    "origin": ("xyz", "rpy", "quat_xyzw"),
+    "axis": ("xyz",),
+    "limit": ("lower", "upper", "effort", "velocity", "acceleration", "deceleration", "jerk"),
+    "dynamics": ("damping", "friction"),
+    "mimic": ("joint", "multiplier", "offset"),
+}
+#: Share of letters from which a name was meant to be another one
+_MISSPELT = 0.8
 
 
 class Remarks:
@@ -124,6 +144,44 @@ def check_links(path: pathlib.Path, tree: ElementTree.Element, remarks: Remarks)
     for links, loud in ((wrong, True), (slightly, False)):
         if links:
             remarks.add("inertia", f"principal moments that no body has [kg m^2]: {'; '.join(links)}", loud=loud)
+
+
+def check_elements(tree: ElementTree.Element, remarks: Remarks) -> None:
+    """What is not read is said: elements and attributes without a meaning, those that stand twice, of which the first
+    counts, and soft limits that are narrower than the limits.
+    """
+    for element in (tree, *tree.findall("link"), *tree.findall("joint")):
+        read, tags = _READ["robot" if element is tree else element.tag], [str(part.tag) for part in element]
+        whose = "" if element is tree else f" of {element.tag} {element.get('name')!r}"
+        for tag in dict.fromkeys(tags):
+            if tag in read:
+                several = tags.count(tag) if element is not tree and tag not in ("visual", "collision") else 1
+                if several > 1:
+                    remarks.add("elements", f"<{tag}>{whose} is there {several} times, the first counts")
+            elif tag not in _NO_MECHANICS and not tag.startswith("{"):
+                meant = _meant(tag, read)
+                remarks.add("elements", f"not read: <{tag}>{whose}{meant}", loud=bool(meant) or element.tag != "link")
+        for part in element if element.tag == "joint" else ():
+            for name in set(part.attrib) - set(_ATTRIBUTES.get(str(part.tag), part.attrib)):
+                if meant := _meant(name, _ATTRIBUTES[str(part.tag)]):
+                    remarks.add("elements", f"not read: {name} in <{part.tag}>{whose}{meant}")
+    narrower = list[str]()
+    for joint in tree.findall("joint"):
+        limit, soft = joint.find("limit"), joint.find("safety_controller")
+        if limit is None or soft is None or soft.get("soft_lower_limit") == soft.get("soft_upper_limit"):
+            continue
+        low, high = number(soft, "soft_lower_limit"), number(soft, "soft_upper_limit")
+        if joint.get("type") != "continuous" and (low > number(limit, "lower") or high < number(limit, "upper")):
+            narrower.append(f"{joint.get('name')} {low:g} to {high:g}")
+    if narrower:
+        text = f"soft limits of position are not held, with_limits gives them: {', '.join(narrower)}"
+        remarks.add("soft limits", text, loud=False)
+
+
+def _meant(name: str, known: Iterable[str]) -> str:
+    """Which of the known names a misspelt one was meant to be, in words."""
+    near = difflib.get_close_matches(name, known, 1, _MISSPELT)
+    return f" (did you mean {near[0]}?)" if near else ""
 
 
 def shown(values: Array) -> str:

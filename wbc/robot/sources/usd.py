@@ -34,6 +34,10 @@ _QUIET = (
     *("MaterialBinding", "PhysicsDrive", "PhysxJoint", "PhysicsJointState"),
 )
 WORLD = "world"
+#: Gravity that robots are given [m/s^2]
+GRAVITY = 9.81
+#: What a scene's may differ from it by without a word [m/s^2]
+NEAR_GRAVITY = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +52,8 @@ class UsdJoint:
 
 
 def converted(path: pathlib.Path) -> pathlib.Path:
-    """The SDF file of a stage, in the cache. Bodies stand where its joints at zero put them, from the root's pose on.
+    """The SDF file of a stage, in the cache. Bodies stand where its joints at zero put them, from the root's pose on; z
+    is upwards: against the gravity of the stage's scene, or else along its up axis, which is y unless it says so.
 
     What is said of joints' limits, forces of drives, masses and inertias is there, in SI units. What else applies to a
     body or joint, and joints that are off, are named in the log.
@@ -92,6 +97,16 @@ class _Stage:
             named = [] if applied is None else map(str, applied.GetAddedOrExplicitItems())
             if others := [one for one in named if one.startswith(("Physics", "Physx")) and not one.startswith(_QUIET)]:
                 self.lost.append(f"{', '.join(others)} of {prim.GetName()}")
+        up = np.eye(3)["XYZ".index(str(UsdGeom.GetStageUpAxis(stage)))]
+        for scene in (UsdPhysics.Scene(prim) for prim in prims if prim.IsA(UsdPhysics.Scene)):
+            down, most = (
+                np.array(scene.GetGravityDirectionAttr().Get()),
+                scene.GetGravityMagnitudeAttr().Get() * self._length,
+            )
+            up = -down / np.linalg.norm(down) if down.any() else up
+            if most >= 0.0 and abs(most - GRAVITY) > NEAR_GRAVITY:
+                self.lost.append(f"gravity of {most:.4g} m/s^2, which is {GRAVITY} here")
+        self._upright = own.SE3(_turned_up(up), np.zeros(3))
         joints = [prim for prim in prims if prim.IsA(UsdPhysics.Joint)]
         self._joints = [joint for prim in joints if (joint := self._joint(prim)) is not None]
 
@@ -128,7 +143,7 @@ class _Stage:
                     if joint.ends[side] == here and other and other not in out:
                         out[other] = out[here] * joint.poses[side] * joint.poses[1 - side].inverse()
                         reached.append(other)
-        return out
+        return {path: self._upright * pose for path, pose in out.items()}
 
     def _joint(self, prim: Any) -> UsdJoint | None:
         joint, name = self._physics.Joint(prim), str(prim.GetName())
@@ -245,6 +260,14 @@ def _rotation(quaternion: Any) -> Array:
         return np.eye(3)
     numbers = np.array([*quaternion.GetImaginary(), quaternion.GetReal()], dtype=float)
     return np.asarray(own.Quaternion(numbers / np.linalg.norm(numbers)).toRotationMatrix())
+
+
+def _turned_up(up: Array) -> Array:
+    """The rotation by the least angle that takes a direction to z; about x where that is any."""
+    cosine, axis = float(up[2]), np.array([up[1], -up[0], 0.0])
+    if float(np.linalg.norm(axis)) < 1e-9:
+        return np.diag([1.0, cosine, cosine])
+    return np.asarray(own.exp3(axis * (math.atan2(float(np.linalg.norm(axis)), cosine) / float(np.linalg.norm(axis)))))
 
 
 def _text(pose: own.SE3) -> str:

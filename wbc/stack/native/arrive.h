@@ -145,14 +145,20 @@ static int forces_large(const wbc_tick *t) {
     return large;
 }
 
-/* Loops closed to EXACT by joints as `ease` says, 0 of those that are held, and the velocity `v` as near as keeps them closed; 0 where
- * that takes larger corrections than there may be. The factor is that of the rows before the last step: what that leaves is of second
- * order. */
+/* Closes loops to EXACT by the shortest change of joints in the metric `ease`, 0 of joints that are held; where some are held, loops may
+ * stay open by 2 EASED. Then `v` becomes the nearest velocity that keeps them closed. 0 where that takes larger corrections than there
+ * may be. The factor is that of the rows before the last step: what that leaves is of second order. */
 static int close_there(wbc_tick *t, const double *way, const double *ease, double share, double *v) {
     double from[NQ + 1], e[CLOSING_ROOM + 1] = {0}, change[NV], sum[NV] = {0};
     double fastest = 0.0, off = arrive_at(t, t->q, way);
-    for (int i = 0; i < DOFS; i++) fastest = larger(fastest, fabs(way[i]) / dof_scale[i]);
+    int held = 0;
+    for (int i = 0; i < DOFS; i++) {
+        fastest = larger(fastest, fabs(way[i]) / dof_scale[i]);
+        held |= ease[i] == 0.0;
+    }
     const double most = CLOSING_SPEED + share * fastest;
+    const double most_open = held ? 2.0 * EASED : EXACT;
+    const double most_rate = held ? larger(OPEN_RATE, 2.0 * room_of(t, EASED) * t->dt) : OPEN_RATE;
     factor_closing(t, ease);
     for (int n = 0; n < CLOSING_STEPS && off > EXACT; n++) {
         if (n > 0) factor_closing(t, ease);
@@ -160,15 +166,15 @@ static int close_there(wbc_tick *t, const double *way, const double *ease, doubl
         memcpy(from, t->report.next_q, NQ * sizeof(double));
         off = arrive_at(t, from, change);
     }
-    if (!(off <= EXACT)) return 0;
+    if (!(off <= most_open)) return 0;
     if (forces_large(t) && closing_way(t, ease, sum, most, change)) {
         const double rest[NV] = {0};
         memcpy(from, t->report.next_q, NQ * sizeof(double));
-        if (!(arrive_at(t, from, change) <= EXACT)) arrive_at(t, from, rest);
+        if (!(arrive_at(t, from, change) <= most_open)) arrive_at(t, from, rest);
     }
     for (int i = 0; i < DOFS; i++) sum[i] = 0.0;
     double rate = open_rate(t, v, e);
-    for (int n = 0; n <= PROJECTIONS && rate > (n < PROJECTIONS ? ROUNDED_RATE : OPEN_RATE); n++) {
+    for (int n = 0; n <= PROJECTIONS && rate > (n < PROJECTIONS ? ROUNDED_RATE : most_rate); n++) {
         /* Next to where loops branch rows turn so fast that those before the last step are too far off */
         if (n == PROJECTIONS) factor_closing(t, ease);
         shortest_change(t, ease, e, change);
@@ -176,37 +182,66 @@ static int close_there(wbc_tick *t, const double *way, const double *ease, doubl
         for (int i = 0; i < DOFS; i++) v[i] += change[i];
         rate = open_rate(t, v, e);
     }
-    return rate <= OPEN_RATE;
+    return rate <= most_rate;
 }
 
-/* Whether a number passes an end that the command keeps, or passes it by more than that */
-INLINE int passes(double low, double high, double command, double number) {
-    const double most = larger(high, command), least = smaller(low, command);
-    return number > most + ROUNDED_BOUND * (1.0 + fabs(most)) || number < least - ROUNDED_BOUND * (1.0 + fabs(least));
+/* By how much a number passes an end that the command keeps, or passes it by more than the command; 0 by rounding */
+INLINE double passes(double low, double high, double command, double number, double rounding) {
+    const double over = larger(number - larger(high, command), smaller(low, command) - number);
+    return over > rounding ? over : 0.0;
+}
+
+/* By how much an acceleration, or what a row makes of it, passes bounds that are so large */
+INLINE double passes_bounds(double low, double high, double command, double number) {
+    return passes(low, high, command, number, ROUNDED_BOUND * (1.0 + fabs(command)));
+}
+
+/* By how much joint i has another acceleration than its bounds allow, and is beyond its limits of position by more than `rounding`:
+ * the acceleration that leads there within a tick */
+static double joint_passes(const wbc_tick *t, const double *v, int i, double rounding) {
+    const double command = t->report.v[i], over = passes_bounds(t->low[i], t->high[i], command, (v[i] - t->v_last[i]) / t->dt);
+    if (stop_at[i] < 0 || t->bound_enabled[stop_at[i]] == 0.0) return over;
+    const double place = t->q[stop_q[i]] + t->dt * (t->v_last[i] + 0.5 * t->dt * command);
+    const double beyond = passes(stop_low[i], stop_high[i], place, t->report.next_q[stop_q[i]], rounding);
+    return larger(over, 2.0 * beyond / (t->dt * t->dt));
+}
+
+/* By how much a row of one joint alone is passed */
+static double row_passes(const wbc_tick *t, const double *v, int k) {
+    const int i = a_col[a_start[k]];
+    if (a_end[k] - a_start[k] != 1 || i >= DOFS) return 0.0;
+    const double factor = t->at[a_start[k]], a = (v[i] - t->v_last[i]) / t->dt;
+    return passes_bounds(t->free_low[k], t->free_high[k], factor * t->report.v[i], factor * a);
 }
 
 /* Joints that would pass bounds of acceleration, rows of them alone, or limits of position are held from now on; whether there are
  * any */
 static int hold_beyond(const wbc_tick *t, const double *v, double *ease) {
-    int more = 0;
-    double a[NV];
+    int more = 0, held[DOFS];
+    for (int i = 0; i < DOFS; i++) held[i] = joint_passes(t, v, i, 0.0) > 0.0;
+    for (int k = 0; k < MC; k++)
+        if (row_passes(t, v, k) > 0.0) held[a_col[a_start[k]]] = 1;
     for (int i = 0; i < DOFS; i++) {
-        const double there = t->report.next_q[stop_q[i]];
-        a[i] = (v[i] - t->v_last[i]) / t->dt;
-        int held = passes(t->low[i], t->high[i], t->report.v[i], a[i]);
-        held |= stop_at[i] >= 0 && t->bound_enabled[stop_at[i]] != 0.0 && (there < stop_low[i] || there > stop_high[i]);
-        more |= held && ease[i] != 0.0;
-        if (held) ease[i] = 0.0;
-    }
-    for (int k = 0; k < MC; k++) {
-        const int i = a_col[a_start[k]];
-        const double factor = t->at[a_start[k]];
-        if (a_end[k] - a_start[k] != 1 || i >= DOFS) continue;
-        if (!passes(t->free_low[k], t->free_high[k], factor * t->report.v[i], factor * a[i])) continue;
-        more |= ease[i] != 0.0;
-        ease[i] = 0.0;
+        more |= held[i] && ease[i] != 0.0;
+        if (held[i]) ease[i] = 0.0;
     }
     return more;
+}
+
+/* Limits that closed loops pass give way */
+static void report_passed(wbc_tick *t) {
+    int gave_way = 0;
+    for (int i = 0; i < DOFS; i++) {
+        const double over = joint_passes(t, t->report.next_v, i, OPENED);
+        t->report.beyond[i] = larger(t->report.beyond[i], over);
+        gave_way |= over > 0.0;
+    }
+    for (int k = 0; k < MC; k++) {
+        const double over = row_passes(t, t->report.next_v, k);
+        t->report.slack[k] = larger(t->report.slack[k], over);
+        gave_way |= over > 0.0;
+    }
+    if (gave_way) t->report.flag = WBC_RELAXED;
 }
 
 /* The same, where `within`, with joints at their bounds held; 0 where the loops cannot be closed so */
@@ -239,15 +274,12 @@ static int arrives_within(wbc_tick *t) {
 }
 
 /* Rows of loops that were closed where the tick begins and are not where it leads give way, by accelerations */
-static int report_open(wbc_tick *t, int flag) {
-    double way[NV];
-    if (closing_share(t) == 0.0) return flag;
-    follow(t, way);
-    arrive_at(t, t->q, way);
-    for (int k = 0; k < CLOSING; k++)
-        if (fabs(t->opened[k]) > 10.0 * EXACT * row_scale[CLOSING_FIRST + k])
-            t->report.slack[CLOSING_FIRST + k] = 2.0 * fabs(t->opened[k]) / (t->dt * t->dt);
-    return (int)(t->report.flag = WBC_RELAXED);
+static void report_open(wbc_tick *t) {
+    for (int k = 0; k < CLOSING; k++) {
+        if (fabs(t->opened[k]) <= 10.0 * EXACT * row_scale[CLOSING_FIRST + k]) continue;
+        t->report.slack[CLOSING_FIRST + k] = 2.0 * fabs(t->opened[k]) / (t->dt * t->dt);
+        t->report.flag = WBC_RELAXED;
+    }
 }
 
 /* Sides of the rows of loops that are held, moved so that the velocity at the end of the tick keeps loops closed where the command
@@ -274,15 +306,21 @@ static int bend_arrival(wbc_tick *t) {
 
 #endif
 
-/* The velocity that the next tick counts from, and where loops are closed until then */
+/* The velocity that the next tick counts from, and where loops are closed until then. Where that takes more than limits allow these
+ * give way, and loops that stay open. */
 EXPORT void wbc_tick_arrive(wbc_tick *t) {
     double way[NV];
     if (!t->arrived) follow(t, way);
 #if CLOSING > 0
     if (!t->arrived && !arrives_within(t)) {
         follow(t, way);
-        const double share = closing_share(t), whole = t->report.flag == WBC_SOLVED || share == 0.0 ? 0.0 : WHOLE_SHARE;
-        if (!closes(t, way, share, 0) && !(whole > 0.0 && closes(t, way, whole, 0))) arrive_at(t, t->q, way);
+        /* Those that are open where it begins are left to their rows */
+        const double share = closing_share(t);
+        const int whole = t->report.flag != WBC_SOLVED;
+        const int closed = share > 0.0 && (closes(t, way, share, 0) || (whole && closes(t, way, WHOLE_SHARE, 0)));
+        if (!closed) arrive_at(t, t->q, way);
+        if (closed && t->report.flag <= WBC_RELAXED) report_passed(t);
+        else if (t->report.flag == WBC_SOLVED && share > 0.0) report_open(t);
     }
 #endif
     t->arrived = 0;

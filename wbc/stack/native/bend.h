@@ -6,7 +6,8 @@
 
 /* A residual may bend by so much [rad, or characteristic lengths, per second]; at a gain of 10/s a tenth of that remains */
 #define BENDS 1e-3
-/* Exact rows that miss 0 at q (+) v dt by more give way [rad, or characteristic lengths] */
+/* Exact rows that miss 0 at q (+) v dt by more give way, and limits of position that are passed by more where loops are closed [rad, or
+ * characteristic lengths] */
 #define OPENED 1e-9
 /* Where joints that are stopped by bounds are to be left out of account, as others make up for them in one tick more than their
  * Jacobians say: as above */

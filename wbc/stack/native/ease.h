@@ -9,6 +9,14 @@
 #define EXACT 1e-10
 /* By how much loops may stay open where joints at their stops would close them [rad, or characteristic lengths] */
 #define EASED 2e-10
+/* How much rows miss of loops that stay so: by velocities all of it in a tick, by accelerations w^2 e, w = 0.2 / dt, as in second.py */
+#define CLOSING_RATE_SQUARED 0.04
+INLINE double room_of(const wbc_tick *t, double open) {
+    return COMMAND == VELOCITY ? open / t->dt : CLOSING_RATE_SQUARED * open / (t->dt * t->dt);
+}
+/* Whether there are loops, and whether limits give way to them as they need it: at prices they do in any case */
+#define LOOPS ((COMMAND == VELOCITY ? BENDING : CLOSING) > 0)
+#define LOOPS_LAST (LOOPS && !ELASTIC)
 /* Steps between limits and what loops allow at most, on the way to where these are nearest to each other */
 #define NEARINGS 50
 
@@ -44,16 +52,17 @@ static void own_sides(wbc_tick *t) {
     uncross(t);
 }
 
-#if COMMAND == VELOCITY && BENDING > 0
-
-INLINE int exact_row(const wbc_tick *t, int k) { return bent[k] == 2 && t->free_low[k] == t->free_high[k]; }
+INLINE int exact_row(const wbc_tick *t, int k) {
+    const int closes = COMMAND == VELOCITY ? bent[k] == 2 : k >= CLOSING_FIRST && k < CLOSING_FIRST + CLOSING;
+    return closes && t->free_low[k] == t->free_high[k];
+}
 
 /* Closed loops get room, in units of rows; whether there are any */
 static int ease_loops(wbc_tick *t, double room) {
     for (int k = 0; k < MC; k++) {
         if (!exact_row(t, k) || MINIMISED(k)) continue;
-        t->low[NV + k] = t->free_low[k] - room * row_scale[k] / t->dt;
-        t->high[NV + k] = t->free_high[k] + room * row_scale[k] / t->dt;
+        t->low[NV + k] = t->free_low[k] - room_of(t, room) * row_scale[k];
+        t->high[NV + k] = t->free_high[k] + room_of(t, room) * row_scale[k];
         t->eased = room;
     }
     t->prepared = t->reduced = 0;
@@ -65,7 +74,7 @@ static int ease_loops(wbc_tick *t, double room) {
 static int loops_open(const wbc_tick *t) {
     int open = 0;
     for (int k = 0; k < MC; k++)
-        open |= exact_row(t, k) && fabs(row_at(t, k, t->x) - t->free_low[k]) > 2.0 * EASED * row_scale[k] / t->dt;
+        open |= exact_row(t, k) && fabs(row_at(t, k, t->x) - t->free_low[k]) > 2.0 * room_of(t, EASED) * row_scale[k];
     return open;
 }
 
@@ -78,23 +87,29 @@ static void unbend_loops(wbc_tick *t) {
     }
 }
 
-/* Loops alone, and limits of position as far as they count in a tick where `stops`; other rows and limits go */
+/* What takes joint i from where it is to `place` within the tick */
+INLINE double command_to(const wbc_tick *t, int i, double place) {
+    const double rate = (place - t->q[stop_q[i]]) / t->dt;
+    return COMMAND == VELOCITY ? rate : 2.0 * (rate - t->v_last[i]) / t->dt;
+}
+
+/* Loops, what never gives way, and limits of position as far as they count in a tick where `stops`; other rows and limits go */
 static void only_loops(wbc_tick *t, int stops) {
     for (int k = 0; k < MC; k++) {
-        const int exact = exact_row(t, k);
-        t->low[NV + k] = exact ? t->free_low[k] : -WBC_INF;
-        t->high[NV + k] = exact ? t->free_high[k] : WBC_INF;
-        t->idle[k] = !exact;
+        const int stays = exact_row(t, k) || FIRM_ROW(k);
+        t->low[NV + k] = stays ? t->free_low[k] : -WBC_INF;
+        t->high[NV + k] = stays ? t->free_high[k] : WBC_INF;
+        t->idle[k] = !stays;
     }
     for (int i = 0; i < NV; i++) {
         const double far = FAR_AWAY * dof_scale[i];
         const int ends = stops && stop_at[i] >= 0 && t->bound_enabled[stop_at[i]] != 0.0;
-        t->low[i] = ends ? smaller(t->low[i], larger(-far, (stop_low[i] - t->q[stop_q[i]]) / t->dt)) : -far;
-        t->high[i] = ends ? larger(t->high[i], smaller(far, (stop_high[i] - t->q[stop_q[i]]) / t->dt)) : far;
+        t->low[i] = ends ? smaller(t->low[i], larger(-far, command_to(t, i, stop_low[i]))) : -far;
+        t->high[i] = ends ? larger(t->high[i], smaller(far, command_to(t, i, stop_high[i]))) : far;
     }
 }
 
-/* The velocity of loops nearest to the limits, into `x`; 0 where there is none */
+/* The command of loops nearest to the limits, into `x`; 0 where there is none */
 static int nearest_to_limits(wbc_tick *t, const double *low, const double *high) {
     memset(t->H, 0, sizeof t->H);
     for (int i = 0; i < NV; i++) t->H[i * WIDE + i] = 1.0 / (dof_scale[i] * dof_scale[i]);
@@ -112,11 +127,11 @@ static void limits_give_way(wbc_tick *t) {
     int found = 0;
     memcpy(H, t->H, sizeof t->H);
     memcpy(g, t->g, sizeof t->g);
-    memcpy(t->x, t->v_last, sizeof t->v_last);
+    for (int i = 0; i < NV; i++) t->x[i] = COMMAND == VELOCITY ? t->v_last[i] : 0.0;
     form_bounds(t);
     memcpy(low, t->low, sizeof low);
     memcpy(high, t->high, sizeof high);
-    for (int n = 0; !found && n < 4 && !t->spent; n++) {
+    for (int n = 0; !found && n < (COMMAND == VELOCITY ? 4 : 2) && !t->spent; n++) {
         if (n == 2) unbend_loops(t);
         only_loops(t, n % 2 == 0);
         found = nearest_to_limits(t, low, high);
@@ -132,24 +147,18 @@ static void limits_give_way(wbc_tick *t) {
     t->prepared = 0;
 }
 
-#endif
-
 /* The QP again, where no velocity keeps all rows: those of loops are the last to give way */
 static int again_with_room(wbc_tick *t, int *flag) {
     int found = -1;
-#if COMMAND == VELOCITY && BENDING > 0
-    if (ease_loops(t, EASED)) found = optimum(t, TIGHT);
+    if (LOOPS && ease_loops(t, EASED)) found = optimum(t, TIGHT);
     if (found >= 0 || t->spent) return found;
-#endif
     *flag = WBC_RELAXED;
     found = relaxed(t);
-#if COMMAND == VELOCITY && BENDING > 0
-    if (t->eased > 0.0 && !t->spent && (found < 0 || loops_open(t))) {
+    if (LOOPS_LAST && t->eased > 0.0 && !t->spent && (found < 0 || loops_open(t))) {
         limits_give_way(t);
         ease_loops(t, EXACT);
         found = relaxed(t);
     }
-#endif
     return found;
 }
 

@@ -124,7 +124,7 @@ static int report_slack(wbc_tick *t, int flag) {
     for (int k = 0; (flag == WBC_RELAXED || flag == WBC_CAPPED) && k < MC; k++) {
         const double value = row_at(t, k, t->report.v);
         const double slack = MINIMISED(k) || price_at[k] >= 0 ? 0.0 : fmax(t->free_low[k] - value, value - t->free_high[k]);
-        const double rounding = larger(2.0 * TOLERANCE, bent[k] == 2 ? 2.0 * t->eased / t->dt : 0.0);
+        const double rounding = larger(2.0 * TOLERANCE, exact_row(t, k) ? 2.0 * room_of(t, t->eased) : 0.0);
         t->report.slack[k] = slack > rounding * row_scale[k] ? slack : 0.0;
         gave_way |= t->report.slack[k] > 0.0;
     }

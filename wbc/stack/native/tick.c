@@ -209,13 +209,9 @@ static int bent_answer(wbc_tick *t, int flag, int *nameless) {
  * accelerations are others, as far as there are any, and where none lead to closed loops, as next to a dead point, smaller ones */
 static int arriving_answer(wbc_tick *t, int flag, int *nameless) {
 #if COMMAND != VELOCITY && CLOSING > 0
-    int open = 0;
     if (CLOSING == 0 || flag != WBC_SOLVED || (t->arrived = arrives_within(t))) return flag;
     for (int n = 0; n < ARRIVALS && flag == WBC_SOLVED; n++) {
-        if (!bend_arrival(t)) {
-            open = n == 0;
-            break;
-        }
+        if (!bend_arrival(t)) break;
         flag = answer(t, nameless);
         if (flag == WBC_SOLVED && !unsound(t, flag) && (t->arrived = arrives_within(t))) return flag;
     }
@@ -226,8 +222,7 @@ static int arriving_answer(wbc_tick *t, int flag, int *nameless) {
     }
     t->shortened = 0.0;
     assemble(t, 1);
-    flag = answer(t, nameless);
-    return open && flag == WBC_SOLVED ? report_open(t, flag) : flag;
+    return answer(t, nameless);
 #else
     (void)t, (void)nameless;
     return flag;
@@ -251,7 +246,20 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
     wbc_tick_look_ahead(t);
     const int sound = !unsound(t, flag) && !nameless;
     commanded(t, sound && flag != WBC_BRAKED);
+    if (flag == WBC_SOLVED) flag = (int)t->report.flag;
     return sound ? flag : flag + WBC_UNSOUND;
+}
+
+/* For solvers in Python, whose QP has no answer: closed loops get room in it by rounding, and, `limits`, limits of motion give way as
+ * far as loops need it; the room that these have, as the rows have it in their units, 0 where they do not give way last */
+EXPORT double wbc_tick_ease(wbc_tick *t, int limits) {
+    t->eased = t->report.iterations = 0.0;
+    t->spent = 0;
+    own_sides(t);
+    if (!LOOPS || (limits && ELASTIC)) return 0.0;
+    if (limits) limits_give_way(t);
+    ease_loops(t, limits ? EXACT : EASED);
+    return room_of(t, t->eased);
 }
 
 EXPORT long long wbc_tick_size(void) { return (long long)sizeof(wbc_tick); }
