@@ -21,7 +21,14 @@ from wbc.climb.report import pictures
 from wbc.climb.report.figures import body_speed, rate_shares
 from wbc.climb.report.pictures import ClimbPictures
 from wbc.climb.report.reach_map import footholds_in_reach
-from wbc.climb.report.surroundings import link_colours, near_footholds, stud_triangles, surface_triangles
+from wbc.climb.report.surroundings import (
+    body_triangles,
+    link_colours,
+    near_footholds,
+    stud_triangles,
+    surface_triangles,
+)
+from wbc.climb.scenes import draw
 from wbc.extras import MissingPackageError
 from wbc.multibody import pin
 from wbc.symbolic.joint_steps import place
@@ -147,3 +154,16 @@ def test_what_is_drawn_is_near_the_way_and_of_the_limbs() -> None:
     corners = surface_triangles(grid, rows, 2.0).reshape(-1, 3)
     assert np.ptp(np.linalg.norm(corners[:, :2], axis=1)) < 0.01
     assert len(stud_triangles(grid, rows, 0.03)) == 30 * len(rows)
+
+
+def test_bodies_under_footholds_that_are_drawn_are_drawn() -> None:
+    scene = draw("rubble", 1.0).scene
+    # From high above, footholds count along their surfaces
+    way, corners = np.array([[1.5, 0.0, 1.2]]), {}
+    rows = near_footholds(scene, way, 1.0).tolist()
+    for name, given in (("near", ()), ("under", rows)):
+        corners[name] = body_triangles(scene, way, 1.0, given).reshape(-1, 3)
+    for row in rows:
+        on = scene.bodies[scene.footholds[row].on].placement.translation
+        assert np.linalg.norm(corners["under"] - on, axis=1).min() < 0.4
+    assert len(corners["near"]) < len(corners["under"])

@@ -111,7 +111,7 @@ class ClimbPictures:
         )
         reach, way = self._reach, self._q[:, :3]
         surface = surroundings.surface_triangles(self.scene, self.near, reach)
-        bodies = surroundings.body_triangles(self.scene, way, SHOWN * reach)
+        bodies = surroundings.body_triangles(self.scene, way, SHOWN * reach, self.near.tolist())
         plain = [] if bodies_only else [row for row in self.near.tolist() if row not in held]
         studs = surroundings.stud_triangles(self.scene, plain, self.stud)
         for triangles, colour in (

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -88,10 +89,13 @@ def surface_triangles(scene: ClimbScene, rows: NDArray[np.intp], reach: float) -
     return np.concatenate(parts)
 
 
-def body_triangles(scene: ClimbScene, way: Array, reach: float) -> Array:
-    """Bodies that end somewhere, those within a distance [m] of the way of the body ``(m, 3, 3)`` [m]."""
+def body_triangles(scene: ClimbScene, way: Array, reach: float, rows: Iterable[int] = ()) -> Array:
+    """Bodies that end somewhere, those within a distance [m] of the way of the body and under the footholds of these
+    rows ``(m, 3, 3)`` [m].
+    """
     parts, line = [np.zeros((0, 3, 3))], way[:: max(1, len(way) // 60)]
-    for body in scene.bodies.values():
+    under = {scene.footholds[row].on for row in rows}
+    for name, body in scene.bodies.items():
         shape, pose = body.shape, body.placement
         if isinstance(shape, (HalfSpace, EndlessCylinder, CylinderInside)):
             continue
@@ -104,7 +108,7 @@ def body_triangles(scene: ClimbScene, way: Array, reach: float) -> Array:
         corners = sides.reshape(-1, 3)
         middle = (corners.min(axis=0) + corners.max(axis=0)) / 2.0
         radius = float(np.linalg.norm(corners - middle, axis=1).max())
-        if float(np.linalg.norm(line - middle, axis=1).min()) < radius + reach:
+        if name in under or float(np.linalg.norm(line - middle, axis=1).min()) < radius + reach:
             parts.append(sides)
     return np.concatenate(parts)
 
