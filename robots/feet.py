@@ -94,13 +94,13 @@ def sole_of(robot: Robot, frame: str) -> Sole:
 
 def _balls(robot: Robot, frame: str) -> LinkBalls:
     """Balls whose hull is that of the shapes that move with a frame, in the axes of its joint."""
-    frames, parts = robot.model.frames, [LinkBalls(np.zeros((0, 3)), np.zeros(0))]
+    frames, parts = robot.model.frames, list[LinkBalls]()
     joint = frames[robot.model.getFrameId(frame)].parentJoint
     for link, shapes in robot.shapes.items():
         on = frames[robot.model.getFrameId(link)]
         if on.parentJoint == joint:
             parts += [LinkBalls.of(placed.shape).moved(on.placement * placed.placement) for placed in shapes]
-    return LinkBalls(np.concatenate([own.centers for own in parts]), np.concatenate([own.radii for own in parts]))
+    return LinkBalls.joined(parts)
 
 
 def _facing(points: Array, down: Array) -> Array:

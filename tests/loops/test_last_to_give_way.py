@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 import pinocchio as pin
@@ -133,6 +133,23 @@ def between_stops(free: Robot, q: Array, rng: np.random.Generator, rooms: Sequen
     return free.with_limits(position_lower=low, position_upper=high)
 
 
+def driven(robot: Robot, command: str, q: Array, rng: np.random.Generator, ticks: int) -> Iterator[Array]:
+    """Where ticks towards random postures lead, all of them solved and within the limits of position."""
+    low, high, index = robot.limits.position_lower, robot.limits.position_upper, robot.position_index
+    controller, v = controller_of(robot, command), np.zeros(robot.nv)
+    controller.reset(q)
+    for k in range(ticks):
+        if k % 40 == 0:
+            controller["posture"].target = pin.integrate(robot.model, q, rng.normal(size=robot.nv))
+        step = controller.step(q, v)
+        assert step.status == "solved", (k, step)
+        v = np.array(step.v)
+        q = pin.integrate(robot.model, q, v * DT) if command == "velocity" else np.array(step.q_next)
+        assert (q[index] >= low - ROUNDED).all()
+        assert (q[index] <= high + ROUNDED).all()
+        yield q
+
+
 #: Linkages with one motion
 ONE_WAY = ("four_bar", "jansen", "hoekens", "bennett", "parallelogram", "gripper", "43")
 
@@ -150,19 +167,9 @@ def test_a_linkage_between_two_stops_stands(seed: int, command: str) -> None:
     low, high, index = robot.limits.position_lower, robot.limits.position_upper, robot.position_index
     q = pin.integrate(robot.model, q, 3e-11 * rng.normal(size=robot.nv))
     q[index] = np.clip(q[index], low, high)
-    start, controller, v = q, controller_of(robot, command), np.zeros(robot.nv)
-    controller.reset(q)
-    for k in range(120):
-        if k % 40 == 0:
-            controller["posture"].target = pin.integrate(robot.model, q, rng.normal(size=robot.nv))
-        step = controller.step(q, v)
-        assert step.status == "solved", (k, step)
-        v = np.array(step.v)
-        q = pin.integrate(robot.model, q, v * DT) if command == "velocity" else np.array(step.q_next)
-        assert max(robot.loop_gaps(q).values()) <= 1e-9, k
-        assert (q[index] >= low - ROUNDED).all()
-        assert (q[index] <= high + ROUNDED).all()
-    assert np.abs(robot.difference(start, q)).max() < 1e-4
+    reached = list(driven(robot, command, q, rng, 120))
+    assert max(max(robot.loop_gaps(there).values()) for there in reached) <= 1e-9
+    assert np.abs(robot.difference(q, reached[-1])).max() < 1e-4
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3, 24, 48, 56])
@@ -173,17 +180,7 @@ def test_a_linkage_turns_back_between_two_stops(seed: int) -> None:
     free = wbc.robots.load(text, shapes="none", velocity=3.0, acceleration=100.0)
     q, _ = moving(free, rng)
     robot = between_stops(free, q, rng, 10.0 ** rng.uniform((-13.0, -5.0), (-11.0, -3.0)))
-    low, high, index = robot.limits.position_lower, robot.limits.position_upper, robot.position_index
-    controller, v = controller_of(robot, "acceleration"), np.zeros(robot.nv)
-    controller.reset(q)
-    for k in range(400):
-        if k % 40 == 0:
-            controller["posture"].target = pin.integrate(robot.model, q, rng.normal(size=robot.nv))
-        step = controller.step(q, v)
-        assert step.status == "solved", (k, step)
-        q, v = np.array(step.q_next), np.array(step.v)
-        assert (q[index] >= low - ROUNDED).all()
-        assert (q[index] <= high + ROUNDED).all()
+    assert len(list(driven(robot, "acceleration", q, rng, 400))) == 400
 
 
 @pytest.mark.parametrize("seed", range(repeats(6)))

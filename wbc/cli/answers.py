@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from wbc.cli.console import OutputError, out, table, tell
 from wbc.cli.reading import numbers
 from wbc.errors import ShapeError, WbcError
 from wbc.ik.answers import SUFFIXES, TargetAnswer
+from wbc.multibody import algebra
 from wbc.robot import Robot
 from wbc.track.target_file import Target, as_target, read_targets
 
@@ -80,19 +81,11 @@ def report(robot: Robot, frame: str, answers: list[TargetAnswer]) -> None:
             tell(f"target {a.target}: {a.reason}")
 
 
-def _angles(robot: Robot) -> Iterator[tuple[int, range]]:
-    """(degree of freedom, its numbers in q): one, or the cosine and sine of a joint that turns without end."""
-    for joint in robot.tree.joints:
-        if joint.nq == joint.nv:
-            yield from ((joint.idx_v + k, range(joint.idx_q + k, joint.idx_q + k + 1)) for k in range(joint.nv))
-        elif joint.nv == 1:
-            yield joint.idx_v, range(joint.idx_q, joint.idx_q + 2)
-
-
 def _joints(robot: Robot, answer: TargetAnswer) -> Table:
-    rows, limits, q = [], robot.limits, answer.solution.q
-    for k, at in _angles(robot):
-        value = float(q[at[0]] if len(at) == 1 else np.arctan2(q[at[1]], q[at[0]]))
+    rows, limits, tree, q = [], robot.limits, robot.tree, answer.solution.q
+    index, turned = robot.position_index, robot.difference(algebra(tree).neutral(tree), q)
+    for k in (joint.idx_v + k for joint in tree.joints if joint.nv in (1, joint.nq) for k in range(joint.nv)):
+        value = float(q[index[k]] if index[k] >= 0 else turned[k])
         bounds = (limits.position_lower[k], limits.position_upper[k])
         texts = (f"{b:.4g}" if np.isfinite(b) else "-" for b in bounds)
         rows.append((robot.dof_names[k], robot.dof_units[k], f"{value:.6f}", *texts))

@@ -119,7 +119,7 @@ def tip_frame(robot: Robot, frame: str | None) -> str:
             return robot.frames[role]
     tree, last = robot.tree, robot.tree.njoints - 1
     if last > 0 and all(tree.parents[j] == j - 1 for j in range(1, last + 1)):
-        return [str(frame.name) for frame in tree.frames if frame.parentJoint == last][-1]
+        return [str(each.name) for each in tree.frames if each.parentJoint == last][-1]
     raise WbcError("frame", None, f"the table knows no tip of {robot.name}; choose with --frame", robot.frame_names[1:])
 
 

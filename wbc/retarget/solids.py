@@ -49,11 +49,12 @@ def balls_of_joints(robot: Robot) -> dict[int, LinkBalls]:
         add(link, LinkBalls(corners, np.zeros(len(corners))), pin.SE3.Identity())
     out = {}
     for joint, parts in found.items():
-        centers, radii = np.concatenate([p.centers for p in parts]), np.concatenate([p.radii for p in parts])
+        every = LinkBalls.joined(parts)
         # The same hull of fewer corners
-        corners, round_ = Hull(centers[radii == 0.0]).vertices, radii > 0.0
-        radii = np.append(np.zeros(len(corners)), radii[round_])
-        out[joint] = LinkBalls(np.concatenate([corners, centers[round_]]), radii)
+        round_ = every.radii > 0.0
+        corners = Hull(every.centers[~round_]).vertices
+        own = LinkBalls(corners, np.zeros(len(corners))), LinkBalls(every.centers[round_], every.radii[round_])
+        out[joint] = LinkBalls.joined(own)
     return out
 
 

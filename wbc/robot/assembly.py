@@ -175,10 +175,12 @@ def _unlocked(loop: AnyLoop, locked: Mapping[str, Array]) -> AnyLoop:
 
 def _check_names(model: pin.Model) -> None:
     world, *names = map(str, model.names)
-    for k, name in enumerate(names):
-        if name == world or name in names[:k]:
+    taken = {world}
+    for name in names:
+        if name in taken:
             reason = "a joint has the name of the world" if name == world else "two joints have this name"
             raise DuplicateNameError("robot", name, reason)
+        taken.add(name)
 
 
 def _check_order(model: pin.Model) -> None:

@@ -41,7 +41,7 @@ def scenery_of(climber: Climber, scene: ClimbScene, q: Array, contacts: Array) -
     surfaces = list[DrawnMesh]()
     for triangles, colour in (
         (surroundings.surface_triangles(scene, rows, reach), surroundings.SURFACE),
-        (surroundings.body_triangles(scene, np.array(q[None, :3]), AROUND * reach), surroundings.BODY),
+        (surroundings.body_triangles(scene, np.array(q[None, :3]), AROUND * reach, rows.tolist()), surroundings.BODY),
     ):
         if len(triangles):
             surfaces.append(indexed(triangles, _bytes(colour)))

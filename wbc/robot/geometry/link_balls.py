@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +36,12 @@ class LinkBalls:
         """Those of a shape in its own frame: the ends of a ball or a capsule, else corners of its surface."""
         *ends, radius = shape.capsule() if shape.is_round else (*shape.triangles().reshape(-1, 3), 0.0)
         return cls(np.array(ends), np.full(len(ends), radius))
+
+    @classmethod
+    def joined(cls, parts: Iterable[LinkBalls]) -> LinkBalls:
+        """All of them as one, of none where there are none."""
+        every = [cls(np.zeros((0, 3)), np.zeros(0)), *parts]
+        return cls(np.concatenate([own.centers for own in every]), np.concatenate([own.radii for own in every]))
 
     @property
     def middle(self) -> Array:

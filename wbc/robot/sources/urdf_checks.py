@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import logging
 import pathlib
 import xml.etree.ElementTree as ElementTree
@@ -34,13 +33,21 @@ _READ = {
 }
 #: Those that say nothing of how a robot moves and weighs
 _NO_MECHANICS = ("material", "transmission", "gazebo", "sensor", "ros2_control", "calibration")
-#: Attributes of the elements of a joint
+#: Elements of a joint -> (attributes that must be numbers where they are, those that must be there)
+NUMBERS = {
+    "limit": (("lower", "upper", "effort", "velocity"), ("effort", "velocity")),
+    "safety_controller": (("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"), ("k_velocity",)),
+    "calibration": (("rising", "falling"), ()),
+    "mimic": (("multiplier", "offset"), ("joint",)),
+    "dynamics": (("damping", "friction"), ()),
+}
+#: Attributes of elements of a joint whose misspelt ones are said
 _ATTRIBUTES = {
     "origin": ("xyz", "rpy", "quat_xyzw"),
     "axis": ("xyz",),
-    "limit": ("lower", "upper", "effort", "velocity", "acceleration", "deceleration", "jerk"),
-    "dynamics": ("damping", "friction"),
-    "mimic": ("joint", "multiplier", "offset"),
+    "limit": (*NUMBERS["limit"][0], "acceleration", "deceleration", "jerk"),
+    "dynamics": NUMBERS["dynamics"][0],
+    "mimic": sum(NUMBERS["mimic"], ()),
 }
 #: Share of letters from which a name was meant to be another one
 _MISSPELT = 0.8
@@ -180,6 +187,9 @@ def check_elements(tree: ElementTree.Element, remarks: Remarks) -> None:
 
 def _meant(name: str, known: Iterable[str]) -> str:
     """Which of the known names a misspelt one was meant to be, in words."""
+    # Imported for a mistake only
+    import difflib
+
     near = difflib.get_close_matches(name, known, 1, _MISSPELT)
     return f" (did you mean {near[0]}?)" if near else ""
 

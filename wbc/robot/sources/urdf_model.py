@@ -17,7 +17,7 @@ from wbc.errors import RobotFileError
 from wbc.multibody import own, single_joint
 from wbc.quick_dataclasses import dataclass
 from wbc.robot.sources.description import root_name
-from wbc.robot.sources.urdf_checks import SINGLE, Remarks
+from wbc.robot.sources.urdf_checks import NUMBERS, SINGLE, Remarks
 from wbc.validation import Array
 
 #: A number as the format has it: no inf, no nan, nothing behind it
@@ -26,14 +26,6 @@ _VERSION = re.compile(r"\s*\+?(\d+)\.\s*\+?(\d+)")
 #: Types of joints that move as they like: their axis and limits say nothing of their numbers
 _FREE = {"floating": own.JointModelFreeFlyer, "planar": own.JointModelPlanar}
 _TYPES = (*SINGLE, *_FREE, "fixed")
-#: Elements of a joint -> (attributes that must be numbers where they are, those that must be there)
-_NUMBERS = {
-    "limit": (("lower", "upper", "effort", "velocity"), ("effort", "velocity")),
-    "safety_controller": (("soft_lower_limit", "soft_upper_limit", "k_position", "k_velocity"), ("k_velocity",)),
-    "calibration": (("rising", "falling"), ()),
-    "mimic": (("multiplier", "offset"), ("joint",)),
-    "dynamics": (("damping", "friction"), ()),
-}
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 #: What stands for no limit of the numbers of a turn, which are at most 1
 PAST_UNIT = 1.01
@@ -173,7 +165,7 @@ class UrdfElements:
         pose, axis, found = self._pose(element.find("origin"), what), np.array([1.0, 0.0, 0.0]), element.find("axis")
         if found is not None and kind not in ("floating", "fixed"):
             axis = self._numbers(found.get("xyz", "0 0 0"), 3, f"the axis of {what}")
-        for tag, (numbers, needed) in _NUMBERS.items():
+        for tag, (numbers, needed) in NUMBERS.items():
             self._check(element.find(tag), numbers, needed, f"<{tag}> of {what}")
         if kind in ("revolute", "prismatic") and element.find("limit") is None:
             raise _refusal(f"{what} is {kind} and has no <limit>")

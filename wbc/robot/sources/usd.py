@@ -16,6 +16,7 @@ import numpy as np
 from wbc import extras
 from wbc.errors import RobotFileError
 from wbc.multibody import own
+from wbc.multibody.model import GRAVITY
 from wbc.robot.sources.made import kept
 from wbc.validation import Array
 
@@ -34,9 +35,7 @@ _QUIET = (
     *("MaterialBinding", "PhysicsDrive", "PhysxJoint", "PhysicsJointState"),
 )
 WORLD = "world"
-#: Gravity that robots are given [m/s^2]
-GRAVITY = 9.81
-#: What a scene's may differ from it by without a word [m/s^2]
+#: What a scene's gravity may differ by from that of models without a word [m/s^2]
 NEAR_GRAVITY = 0.02
 
 
@@ -104,9 +103,9 @@ class _Stage:
                 scene.GetGravityMagnitudeAttr().Get() * self._length,
             )
             up = -down / np.linalg.norm(down) if down.any() else up
-            if most >= 0.0 and abs(most - GRAVITY) > NEAR_GRAVITY:
-                self.lost.append(f"gravity of {most:.4g} m/s^2, which is {GRAVITY} here")
-        self._upright = own.SE3(_turned_up(up), np.zeros(3))
+            if most >= 0.0 and abs(most + GRAVITY) > NEAR_GRAVITY:
+                self.lost.append(f"gravity of {most:.4g} m/s^2, which is {-GRAVITY} here")
+        self._upright = own.SE3(own.Quaternion.FromTwoVectors(up, np.eye(3)[2]).toRotationMatrix(), np.zeros(3))
         joints = [prim for prim in prims if prim.IsA(UsdPhysics.Joint)]
         self._joints = [joint for prim in joints if (joint := self._joint(prim)) is not None]
 
@@ -260,14 +259,6 @@ def _rotation(quaternion: Any) -> Array:
         return np.eye(3)
     numbers = np.array([*quaternion.GetImaginary(), quaternion.GetReal()], dtype=float)
     return np.asarray(own.Quaternion(numbers / np.linalg.norm(numbers)).toRotationMatrix())
-
-
-def _turned_up(up: Array) -> Array:
-    """The rotation by the least angle that takes a direction to z; about x where that is any."""
-    cosine, axis = float(up[2]), np.array([up[1], -up[0], 0.0])
-    if float(np.linalg.norm(axis)) < 1e-9:
-        return np.diag([1.0, cosine, cosine])
-    return np.asarray(own.exp3(axis * (math.atan2(float(np.linalg.norm(axis)), cosine) / float(np.linalg.norm(axis)))))
 
 
 def _text(pose: own.SE3) -> str:
