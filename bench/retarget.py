@@ -84,7 +84,7 @@ def clips_of(folder: Path) -> Iterator[tuple[Clip, Path]]:
 def ours(retargeter: Retargeter, clip: Clip) -> tuple[Row, Retargeted]:
     """By this package, when all is compiled: the median time of some runs."""
     plan = retargeter.run(clip).plan
-    engine = retargeter.engine(tuple(plan.limbs), plan.dt, head=plan.head is not None)
+    engine = retargeter.engine(plan.limbs, plan.dt, head="head" in plan.turns)
     engine.controller.settled()
     motion, seconds = retargeter.run(clip), []
     for _ in range(RUNS):
@@ -144,17 +144,18 @@ def _call(python: str, *arguments: str | Path) -> None:
 def _targets(motion: Retargeted) -> tuple[list[str], list[str], np.ndarray, np.ndarray]:
     """Names and frames of key points, their places, and rotations (NaN: free), at the frames of the motion."""
     plan, body, every = motion.plan, motion.body, motion.every
-    free = np.full((plan.ticks, 3, 3), np.nan)
-    rows: list[tuple[str, str, np.ndarray, np.ndarray]] = [("pelvis", body.pelvis, plan.pelvis, plan.turn)]
+    free = np.full((len(plan.pelvis), 3, 3), np.nan)
+    rows: list[tuple[str, str, np.ndarray, np.ndarray]] = [("pelvis", body.pelvis, plan.pelvis, plan.turns["pelvis"])]
     if body.chest:
-        rows.append(("chest", body.chest, plan.pelvis, plan.chest))
-    for name, limb in plan.limbs.items():
+        rows.append(("chest", body.chest, plan.pelvis, plan.turns["chest"]))
+    for number, name in enumerate(plan.limbs):
+        _, middle, wrist, end = np.moveaxis(plan.chains[:, number], 1, 0)
         own = body.limbs[name]
         if own.middle:
-            rows.append((f"{name} middle", own.middle, limb.middle, free))
+            rows.append((f"{name} middle", own.middle, middle, free))
         if own.wrist and name.endswith("arm"):
-            rows.append((f"{name} wrist", own.wrist, limb.wrist, free))
-        rows.append((name, own.end, limb.end, free if limb.rotation is None else limb.rotation))
+            rows.append((f"{name} wrist", own.wrist, wrist, free))
+        rows.append((name, own.end, end, plan.turns.get(name, free)))
     names, frames, places, turns = zip(*rows, strict=True)
     positions = np.stack([place[::every] for place in places], axis=1)
     return list(names), list(frames), positions, np.stack([turn[::every] for turn in turns], axis=1)

@@ -270,9 +270,9 @@ MUTATIONS = (
     ),
     Mutation(
         "wbc/climb/checker/clearances.py",
-        "here - there, axis=1) - a.radius - b.radius",
-        "here - there, axis=1) - a.radius + b.radius",
-        ("climb/test_checker.py",),
+        "bound = 0.5 * (sum(ends) - (y - x) * travel[k])",
+        "bound = 0.5 * (sum(ends) + (y - x) * travel[k])",
+        ("climb/test_checker_faults.py",),
     ),
     Mutation(
         "wbc/climb/checker/checking.py",

@@ -104,6 +104,26 @@ def scalar(
     return number
 
 
+def own_scalars(
+    owner: Any,
+    *names: str,
+    infinite: bool = False,
+    low: float = -np.inf,
+    high: float = np.inf,
+    open_low: bool = False,
+    unit: str = "",
+) -> None:
+    """Fields of a frozen dataclass become what :func:`scalar` makes of them, or an error that names class and field;
+    with ``infinite`` they may be infinity.
+    """
+    for name in names:
+        value = getattr(owner, name)
+        if not (infinite and isinstance(value, float) and value == np.inf):
+            field = f"{type(owner).__name__}.{name}"
+            value = scalar(field, value, low=low, high=high, open_low=open_low, unit=unit)
+        object.__setattr__(owner, name, value)
+
+
 def ordinary_array(field: str, value: Any, shape: tuple[int, ...] | None = None, *, finite: bool = True) -> Array:
     """:func:`real_array` of numbers whose products are numbers: finite ones are at most 1e60 in size."""
     # The usual first: a small array of numbers whose squares add up to a number, which no NaN does

@@ -13,7 +13,7 @@ from bench.sheet import Sheet
 from tests.climb.by_hand import TRIPODS, climber, gait
 from wbc.climb import BodyPlace, ClimbOptions, ContactPlan, first_stance, plan_climb, scenes
 from wbc.climb.checker import CheckRules, check
-from wbc.climb.loop import ClimbLoop, ClimbRun, LimbState, LoopOptions
+from wbc.climb.loop import ClimbLoop, ClimbRun, LimbState
 from wbc.climb.loop.stack import contact_frame
 from wbc.climb.plants import ClimbPlant, PlantErrors
 from wbc.climb.scene import size_of
@@ -63,7 +63,7 @@ def planned(robot: str, scene: str, seed: int, part: float) -> ContactPlan:
 def carried_out(plan: ContactPlan, errors: PlantErrors) -> tuple[ClimbRun, float]:
     """The run, and the largest part of friction there is, and of the ratings of grips, by MuJoCo's own contacts [1]."""
     plant, limbs = ClimbPlant(plan.climber, plan.scene, errors), plan.climber.limbs
-    loop, most, part = ClimbLoop(plan, plant, options=LoopOptions(delay=errors.delay)), 2.0 * plan.times[-1] + 10.0, 0.0
+    loop, most, part = ClimbLoop(plan, plant, delay=errors.delay), 2.0 * plan.times[-1] + 10.0, 0.0
     frictions = errors.friction * np.array([getattr(limb.contact, "friction", 1.0) for limb in limbs])
     grips = {contact_frame(limb): limb.contact.cone() for limb in limbs if limb.contact.pulls}
     while not loop.ended and loop.time < most:

@@ -21,12 +21,12 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
+from bench.climb.structures import OBSTRUCTED, SCARCE, structure
 from bench.figures.store import stamp
 from bench.harness import machine as host
 from bench.pool import ROOT
 from bench.program import Record, bars, measure, publish
 from bench.sheet import Sheet
-from tests.climb.structures import OBSTRUCTED, SCARCE, structure
 from tests.climb.walkers import walker_with
 from wbc.climb import (
     BodyPlace,

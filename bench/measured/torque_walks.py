@@ -21,7 +21,7 @@ from wbc.climb.checker import CheckRules, check
 from wbc.climb.climber import Climber
 from wbc.climb.faults import PlantFault
 from wbc.climb.grids import INCH, cylinder_grid, grid_pose
-from wbc.climb.loop import ClimbLoop, LoopOptions
+from wbc.climb.loop import ClimbLoop
 from wbc.climb.machines import walking_arms
 from wbc.climb.plants import PlantErrors, climb_plant
 from wbc.errors import RangeError, WbcError
@@ -99,7 +99,7 @@ def tried(trial: Trial) -> tuple[str, ...]:
         assert plant is not None
         goal = BodyPlace(robot.body_pose(plan.q[-1]).translation)
         loop = ClimbLoop(
-            plan, plant, options=LoopOptions(delay=plant.errors.delay),
+            plan, plant, delay=plant.errors.delay,
             replan=lambda scene, at: plan_climb(robot, scene, at, goal, ClimbOptions.by_torques()),
         )  # fmt: skip
     except WbcError as error:

@@ -19,7 +19,7 @@ from wbc.validation import Array
 
 SETS = published_sets("ssrms")
 #: Sets whose loci are compared; the last is the 11 x 7 one
-CHOSEN = ("q1", "q2", "q1, q2", "alpha", "elbow, beta, gamma")
+CHOSEN = ("q1", "alpha", "elbow, beta, gamma")
 #: So many configurations off a locus are looked at
 OFF_LOCUS = 10
 #: A configuration counts as off the locus with every condition this far from true [rad, and of relations' terms]
@@ -77,7 +77,7 @@ def test_singular_values_are_zero_on_the_locus_and_not_off_it(chosen: str) -> No
     assert min(least) > 1e-3
 
 
-@pytest.mark.parametrize("chosen", ["q2", "elbow, beta, gamma"])
+@pytest.mark.parametrize("chosen", ["q1", "elbow, beta, gamma"])
 def test_bounds_prove_boxes_off_the_locus_and_none_that_meets_it(chosen: str) -> None:
     """Small boxes: all of those off it are proved to have full rank, none of those about a point of it."""
     rng, matrix = np.random.default_rng(1), form(chosen)

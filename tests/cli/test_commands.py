@@ -67,6 +67,7 @@ def test_an_unknown_command_names_the_nearest() -> None:
     assert (code, out) == (2, "")
     assert "Did you mean 'robots'" in err
     assert "mode: unknown name, did you mean 'path'?" in run("walk", "pth")[2]
+    assert "mode: unknown name, did you mean 'show'?" in run("robots", "shw", "panda")[2]
 
 
 def test_version() -> None:

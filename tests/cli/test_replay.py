@@ -75,6 +75,11 @@ def test_a_run_that_ends_early_or_is_killed(folder: Path, tmp_path: Path, monkey
     (tmp_path / "cut.npz").write_bytes(whole[:-30])
     code, out, err = run("replay", tmp_path / "cut.npz")
     assert (code, "not closed" in err) == (0, True)
+    code, out, err = run("convert", tmp_path / "cut.npz", "--to", "csv", "--out", tmp_path / "cut.csv")
+    assert (code, "not closed" in err) == (0, True)
+    (tmp_path / "stub.npz").write_bytes(whole[: whole.index(b"stack.pickle") + 9])
+    code, out, err = run("replay", tmp_path / "stub.npz")
+    assert (code, "ends before its stack" in err) == (2, True)
 
 
 def test_a_run_without_a_recording(tmp_path: Path) -> None:

@@ -17,8 +17,8 @@ import wbc.log
 from tests.cli.test_commands import run
 from wbc.cli.app import app
 from wbc.cli.climbing import LimbLines
+from wbc.cli.keys import END, KeyTwists
 from wbc.climb.grids import PITCH
-from wbc.climb.keyboard import END, KeyTwists
 from wbc.climb.request import ClimbRequest, DriveRequest
 from wbc.climb.session import ClimbHooks, climb
 from wbc.terminal import terminal_keys

@@ -58,7 +58,7 @@ def test_the_body_goes_on_while_limbs_change_footholds(plan: ContactPlan, run: C
     assert np.linalg.norm(along - (along @ way)[:, None] * way, axis=1).max() < 1e-3
 
 
-@pytest.mark.parametrize(("begin", "end"), [((6, 18), (14.37, 6)), ((14.37, 6), (6, 18)), ((19, 12), (6, 12))])
+@pytest.mark.parametrize(("begin", "end"), [((6, 18), (14.37, 6)), ((19, 12), (6, 12))])
 def test_long_ways_at_full_speed_take_little_searching(walker: Climber, scene: ClimbScene, begin: tuple[float, float],
                                                        end: tuple[float, float]) -> None:  # fmt: skip
     middle = 0.5 * (begin[0] + end[0]), 0.5 * (begin[1] + end[1])
@@ -173,7 +173,7 @@ def test_a_climb_goes_on_from_its_log(run: ClimbRun, walker: Climber, scene: Cli
     contacts, t = run.log.array("contact"), run.log["t"]
     row, limb = (int(k[0]) for k in np.nonzero((contacts[1:] >= 0) & (contacts[:-1] < 0)))
     assert stance_in(run.log, walker, scene, float(t[row])).contacts[limb] == contacts[row + 1, limb]
-    with pytest.raises(RangeError, match="the log is from"):
+    with pytest.raises(RangeError, match="expected a value in"):
         stance_in(run.log, walker, scene, 1e3)
     with pytest.raises(ShapeError, match="its scene is another"):
         stance_in(run.log, walker, scene.without("1,1"))

@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import linprog
 
 from tests.climb.by_hand import climber, gait
-from wbc.climb import Equilibrium, machines
+from wbc.climb import BodyPlace, ClimbOptions, Equilibrium, NoStancesError, Stance, StanceOptions, machines, plan_climb
 from wbc.climb.bearing import EFFORT_SHARE, check_borne
 from wbc.climb.grids import cylinder_grid
 from wbc.climb.loop import ClimbLoop
@@ -62,6 +62,26 @@ def test_what_it_bears_is_what_a_linear_program_says(seed: int) -> None:
     lacks = Equilibrium(machine, scene).lacking(held, q, EFFORT_SHARE)
     assert (not lacks) == (share >= 1.0)
     assert all(amount > 0.0 for _, amount in lacks)
+
+
+def test_a_robot_too_heavy_for_its_motors_or_without_masses_is_refused_in_numbers() -> None:
+    machine = climber("wall_climber")
+    plan = gait([(0,), (3,)], 0.02, machine=machine)
+    start, goal = Stance(plan.start, plan.q[0]), BodyPlace(plan.q[-1][:3])
+    options = ClimbOptions(StanceOptions(effort=0.75))
+    assert Equilibrium(machine, plan.scene).lacking(plan.start, plan.q[0], 1.0) == []
+    weak = dataclasses.replace(machine, robot=machine.robot.with_limits(effort=0.05))
+    words = r"9\.81 m/s\^2 it cannot stand on limb1.* % of its weight are lacking, by all that its motors give"
+    with pytest.raises(NoStancesError, match=words) as why:
+        plan_climb(weak, plan.scene, start, goal, options)
+    assert why.value.cause == "start"
+    model = machine.robot.model.copy()
+    for k in range(1, model.njoints):
+        model.inertias[k] = pin.Inertia.Zero()
+    bare = dataclasses.replace(machine, robot=dataclasses.replace(machine.robot, model=model))
+    assert bare.center_of_mass(plan.q[0]) == pytest.approx(bare.body_pose(plan.q[0]).translation)
+    with pytest.raises(RangeError, match="has no masses"):
+        plan_climb(bare, plan.scene, start, goal, options)
 
 
 def test_a_plan_that_motors_do_not_bear_says_when_and_what_lacks() -> None:

@@ -62,7 +62,7 @@ def test_rows_are_the_slopes_of_what_they_cost(name: str) -> None:
     np.testing.assert_allclose(g, -0.5 * np.array(slopes), rtol=2e-3, atol=2e-3 * np.abs(g).max())
 
 
-@pytest.mark.parametrize("name", ["a1", "hexapod", "talos"])
+@pytest.mark.parametrize("name", ["a1", "talos"])
 def test_every_move_over_stairs_has_a_motion(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     robot = climber(name)
     course = draw("stairs", size_of(robot))

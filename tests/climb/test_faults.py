@@ -17,7 +17,7 @@ from wbc.climb.along import AlongOptions, BodyTrack, plan_along
 from wbc.climb.checker import CheckRules, check
 from wbc.climb.faults import PlantFault
 from wbc.climb.grids import cylinder_grid
-from wbc.climb.loop import ClimbLoop, ClimbOutcome, ClimbRun, LoopOptions
+from wbc.climb.loop import ClimbLoop, ClimbOutcome, ClimbRun
 from wbc.climb.loop.hand_over import HandOvers
 from wbc.climb.loop.reference import PlanReference
 from wbc.climb.plants import PlantErrors, climb_plant
@@ -35,7 +35,7 @@ def steps() -> ContactPlan:
 def carried_out(plant: str, plan: ContactPlan, *faults: str, errors: PlantErrors | None = None) -> ClimbRun:
     made = climb_plant(plant, plan.climber, plan.scene, errors, [PlantFault.read(text) for text in faults])
     assert made is not None
-    return ClimbLoop(plan, made, options=LoopOptions(delay=made.errors.delay)).run(2.0 * float(plan.times[-1]))
+    return ClimbLoop(plan, made, delay=made.errors.delay).run(2.0 * float(plan.times[-1]))
 
 
 def broken(run: ClimbRun, plan: ContactPlan) -> list[str]:

@@ -1,4 +1,4 @@
-"""Feet of files: balls whose centre is the contact's frame, and soles found from the shapes of links."""
+"""Feet: balls whose centre is the contact's frame, soles found from the shapes of links, and tips without a shape."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from tests.climb.test_search import check
 from tests.distances import coal_distance
 from tests.repeats import repeats
 from tests.robots.files import example
-from wbc.climb import BodyPlace, Climber, ClimbLoop, first_stance, machines, plan_climb
-from wbc.climb.climber import ClimbLimb
+from wbc.climb import BodyPlace, ClimbLoop, ClimbScene, Foothold, first_stance, machines, plan_climb
+from wbc.climb.clear import Clearances, climber_bodies
+from wbc.climb.climber import Climber, ClimbLimb
 from wbc.climb.contacts import PointFoot
 from wbc.climb.request import ClimberRequest
-from wbc.climb.scene import size_of
+from wbc.climb.scene import SceneBody, size_of
 from wbc.climb.scenes import draw, placed
 from wbc.climb.search import StanceOptions, find_stances
 from wbc.climb.session import climber_of
@@ -153,7 +154,7 @@ def test_humanoids_of_files_stand_on_their_soles_and_lift_either_foot(name: str)
         assert PostureOutcome.STANDS in outcomes
 
 
-@pytest.mark.parametrize(("name", "family"), [("g1", "stairs"), ("talos", "stairs"), ("talos", "rubble")])
+@pytest.mark.parametrize(("name", "family"), [("g1", "stairs"), ("talos", "rubble")])
 def test_humanoids_of_files_find_their_stances(name: str, family: str) -> None:
     """With angles at limits of joints, and arms that would be in the way of legs as the file has them."""
     file, feet = HUMANOIDS[name]
@@ -162,3 +163,37 @@ def test_humanoids_of_files_find_their_stances(name: str, family: str) -> None:
     start = first_stance(climber, course.scene, placed(climber, course.start))
     goal = BodyPlace(climber.body_pose(placed(climber, course.goal)).translation)
     check(climber, course.scene, find_stances(climber, course.scene, start, goal, StanceOptions(moves=6000)))
+
+
+def bare(name: str) -> Climber:
+    """A preset without the shapes that its limbs' last joints move."""
+    climber = machines.climber(name)
+    model, last = climber.robot.model, {chain[-1] for chain in climber.chains}
+    shapes = {
+        link: group
+        for link, group in climber.robot.shapes.items()
+        if model.frames[model.getFrameId(link)].parentJoint not in last
+    }
+    robot = climber.robot.with_self_pairs(None).with_shapes(shapes)
+    return replace(climber, robot=machines.ready(robot))
+
+
+def test_a_point_stands_for_contacts_of_tips_that_tilt_or_have_no_shape() -> None:
+    grips = climber_bodies(machines.climber("walker"))
+    assert not [body.name for body in grips if body.name.startswith("contact of")]
+    for climber in (machines.climber("hexapod"), bare("hexapod")):
+        points = [body.name for body in climber_bodies(climber) if body.name.startswith("contact of")]
+        assert points == [f"contact of {limb.name}" for limb in climber.limbs]
+
+
+def test_a_bare_tip_is_kept_out_of_what_it_would_pass_through() -> None:
+    climber = bare("hexapod")
+    angles = climber.angles(climber.rest, 0)
+    ends = [climber.with_limb(climber.rest, 0, angles + turned) for turned in (-0.2 * np.eye(3)[0], 0.2 * np.eye(3)[0])]
+    between = climber.contact_pose(climber.rest, 0).translation
+    plate = SceneBody(Box((0.004, 0.004, 0.004)), pin.SE3(np.eye(3), between))
+    foothold = Foothold("far", pin.SE3(np.eye(3), np.array([100.0, 0.0, 0.0])))
+    around = Clearances(climber, ClimbScene([foothold], {"crumb": plate}), clearance=0.001)
+    nearest = around.moving([(FREE_LIMB,)] * 6, np.array([0.0, 1.0]), np.stack(ends), None)
+    assert nearest is not None
+    assert {nearest.first, nearest.second} == {f"contact of {climber.limbs[0].name}", "crumb"}

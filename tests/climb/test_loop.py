@@ -18,7 +18,7 @@ from wbc.climb.checker import check
 from wbc.climb.drive import standing_plan
 from wbc.climb.grids import cylinder_grid
 from wbc.climb.limb_work import plan_limb_work
-from wbc.climb.loop import TRANSITIONS, Cause, ClimbLoop, ClimbOutcome, ClimbRun, LimbState, LoopOptions, PlanReference
+from wbc.climb.loop import TRANSITIONS, Cause, ClimbLoop, ClimbOutcome, ClimbRun, LimbState, PlanReference
 from wbc.climb.loop.limb_state import after
 from wbc.errors import RangeError
 from wbc.shapes import Box, PlacedShape
@@ -168,9 +168,12 @@ def test_a_planner_is_asked_from_the_stance_that_the_robot_is_in() -> None:
     assert {cause for *_, cause in run.changes} >= {Cause.NEW_PLAN, Cause.AT_FOOTHOLD}
 
 
-def test_a_planner_that_finds_nothing_ends_the_run_with_its_reason() -> None:
-    def planner(scene: ClimbScene, stance: Stance) -> ContactPlan:
-        raise RangeError("goal", "x", "nothing within 0.3 m")
+@pytest.mark.parametrize(("found", "said"), [(RangeError("goal", "x", "nothing within 0.3 m"), "nothing within 0.3 m"),
+                                             (None, "expected a ContactPlan")])  # fmt: skip
+def test_a_planner_that_finds_nothing_ends_the_run_with_its_reason(found: RangeError | None, said: str) -> None:
+    def planner(scene: ClimbScene, stance: Stance) -> Any:
+        if found is not None:
+            raise found
 
     plan = gait(TRIPODS)
     loop = ClimbLoop(plan, replan=planner)
@@ -180,7 +183,7 @@ def test_a_planner_that_finds_nothing_ends_the_run_with_its_reason() -> None:
     loop.see(dataclasses.replace(plan.scene, bodies={**plan.scene.bodies, "stone": stone}))
     run = loop.run()
     assert run.outcome is ClimbOutcome.STOPPED
-    assert "nothing within 0.3 m" in run.reason
+    assert said in run.reason
     assert "the bodies of the scene are others" in run.reason
     _stands(run)
 
@@ -267,7 +270,7 @@ def test_a_limb_that_lifts_again_at_once_lands_first() -> None:
     near = np.argsort(np.linalg.norm(scene.positions - scene.positions[stance.contacts[0]], axis=1))
     ids = [scene.footholds[row].id for row in near if row not in stance.contacts][:2]
     plan = plan_limb_work(walker, scene, stance, walker.limbs[0].name, ids)
-    run = ClimbLoop(plan, options=LoopOptions(period=0.03), backend="vm").run()
+    run = ClimbLoop(plan, period=0.03, backend="vm").run()
     assert run.outcome is ClimbOutcome.ARRIVED, run.reason
     latched = next(time for time, _, state, _ in run.changes if state is LimbState.LATCHING)
     row = int(np.searchsorted(run.log["t"], latched + 1e-9, side="right")) - 1

@@ -11,8 +11,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from tests.climb.on_stones import on_stones
 from tests.climb.referee import between, body_speeds, fastest_share, least_distances, slipped
+from tests.climb.stones import on_stones
 from wbc.climb import motion
 from wbc.climb.balance import Equilibrium
 from wbc.climb.clear import Clearances

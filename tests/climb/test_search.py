@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -12,11 +12,10 @@ from tests.climb.bearing import slack_by_scipy
 from tests.climb.stones import reached_by_all, stones
 from tests.repeats import repeats
 from wbc.climb.balance import Equilibrium
-from wbc.climb.clear import Clearances
+from wbc.climb.clear import Clearances, climber_bodies
 from wbc.climb.climber import Climber
 from wbc.climb.first import first_stance
 from wbc.climb.goal import BodyPlace, LimbAt, Route
-from wbc.climb.joint_values import beyond_limits
 from wbc.climb.machines import climber
 from wbc.climb.scene import ClimbScene, Foothold, size_of
 from wbc.climb.scenes import draw, placed
@@ -24,6 +23,9 @@ from wbc.climb.search import NoStancesError, StanceOptions, find_stances
 from wbc.climb.stance import FREE_LIMB, Stance, StancePath
 from wbc.climb.world import ClimbWorld, PostureOutcome
 from wbc.errors import RangeError, ShapeError, UnknownNameError
+from wbc.geometry.kernel import ShapeTable, distances
+from wbc.robot.joint_values import beyond_limits
+from wbc.symbolic.joint_steps import place
 
 
 def check(robot: Climber, scene: ClimbScene, path: StancePath, margin: float = 0.02) -> None:
@@ -246,3 +248,38 @@ def test_a_body_yields_where_limbs_end_at_limits_just_off_their_footholds(places
         pose, wanted = robot.contact_pose(q, limb), world.places[at]
         np.testing.assert_allclose(pose.translation, wanted[9:], atol=1e-8)
         np.testing.assert_allclose(pose.rotation.ravel(), wanted[:9], atol=1e-8)
+
+
+@pytest.mark.parametrize(("name", "family"), [("hexapod", "rubble"), ("talos", "rubble"), ("walker", "cylinder")])
+def test_links_are_clear_where_all_distances_say_so(name: str, family: str) -> None:
+    """Bodies that are far from the robot, and links that never move relative to each other, are not looked at."""
+    machine = climber(name)
+    scene, robot = draw(family, size_of(machine)).scene, machine.robot
+    model, data, rng = robot.model, robot.model.createData(), np.random.default_rng(4)
+    links, bodies, apart = climber_bodies(machine), list(scene.bodies.values()), 0.003
+    world = ClimbWorld(machine, scene, clear=0.01, apart=apart, spare=0.0)
+    table = ShapeTable([body.shape for body in (*links, *bodies)])
+    ground = [(body.placement or pin.SE3.Identity()) * pin.SE3(np.eye(3), body.shape.center) for body in bodies]
+    beside = [(k, len(links) + j) for k in range(len(links)) for j in range(len(bodies))]
+    pairs = {frozenset(pair) for pair in robot.self_pairs or ()}
+    own = [(k, j) for k, j in combinations(range(len(links)), 2) if {links[k].link, links[j].link} in pairs]
+    first, second = np.array(beside + own).T
+    kept = np.repeat([0.01, apart], [len(beside), len(own)])
+    free, seen = world.contacts([FREE_LIMB] * len(machine.limbs)), set[bool]()
+    for _ in range(60 * repeats(1)):
+        at, shaken = rng.choice(scene.positions), world.state_of(machine.rest)
+        shaken[9:12] = (
+            at + rng.normal(scale=0.3, size=3) + rng.uniform(0.0, 1.2) * size_of(machine) * np.array([0, 0, 1])
+        )
+        shaken[12:] += rng.normal(scale=rng.choice([0.02, 0.4]), size=len(shaken) - 12)
+        pin.framesForwardKinematics(model, data, world.q_of(shaken))
+        frames = [data.oMf[model.getFrameId(body.link)] for body in links]
+        placed_links = [
+            frame * (body.placement or pin.SE3.Identity()) * pin.SE3(np.eye(3), body.shape.center)
+            for frame, body in zip(frames, links, strict=True)
+        ]
+        poses = np.array([place(pose) for pose in (*placed_links, *ground)])
+        clear = bool((distances(table, poses, first, second)[:, 0] >= kept).all())
+        assert (world.look(free, shaken)[0][1] >= 0.0) == clear
+        seen.add(clear)
+    assert seen == {True, False}

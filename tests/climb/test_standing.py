@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
@@ -20,6 +21,8 @@ from wbc.climb.request import ClimberRequest
 from wbc.climb.scene import size_of
 from wbc.climb.scenes import draw, placed
 from wbc.climb.session import climber_of
+from wbc.climb.world import SPARE
+from wbc.robot.pairs.distances import Links
 from wbc.robots import load
 from wbc.shapes import PlacedShape, Sphere
 
@@ -74,6 +77,41 @@ def test_a_refusal_names_the_links_that_touch() -> None:
     course = draw("stairs", size_of(climber))
     with pytest.raises(NoStancesError, match=r"links touch.*; most often \w+_link and floor 1 touch"):
         first_stance(climber, course.scene, placed(climber, course.start))
+
+
+def test_fingers_that_are_too_near_as_the_file_has_them_are_opened_by_the_joint_that_they_follow(
+    tmp_path: Path,
+) -> None:
+    def link(name: str, form: str, at: str = "0 0 0") -> str:
+        inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
+        form = f'<collision><origin xyz="{at}"/><geometry>{form}</geometry></collision>'
+        return f'<link name="{name}"><inertial><mass value="0.2"/>{inertia}</inertial>{form}</link>'
+
+    def joint(name: str, parent: str, xyz: str, axis: str, more: str = "") -> str:
+        ends = f'<parent link="{parent}"/><child link="{name}"/><origin xyz="{xyz}"/><axis xyz="{axis}"/>'
+        limit = '<limit lower="-1.2" upper="1.2" effort="50" velocity="5"/>'
+        return f'<joint name="{name}_joint" type="revolute">{ends}{limit}{more}</joint>'
+
+    ball, short = '<sphere radius="0.02"/>', '<sphere radius="0.01"/>'
+    parts = [link("body", '<box size="0.2 0.2 0.05"/>')]
+    for k, turn in enumerate(2.0 * np.pi * np.arange(3) / 3):
+        x, y = np.cos(turn), np.sin(turn)
+        legs = ("hip", "body", 0.2, 0.0), ("thigh", f"hip{k}", 0.05, 0.0), ("shin", f"thigh{k}", 0.1, -0.15)
+        for name, parent, far, down in legs:
+            axis = "0 0 1" if name == "hip" else f"{-y} {x} 0"
+            parts += [link(f"{name}{k}", short), joint(f"{name}{k}", parent, f"{far * x} {far * y} {down}", axis)]
+        parts += [f'<link name="foot{k}"/><joint name="foot{k}_joint" type="fixed"><parent link="shin{k}"/>']
+        parts += [f'<child link="foot{k}"/><origin xyz="0 0 -0.25"/></joint>']
+    parts += [link("finger1", ball, "0.08 0.0002 0"), joint("finger1", "body", "0 0.02 0.3", "0 0 1")]
+    follows = '<mimic joint="finger1_joint" multiplier="-1"/>'
+    parts += [link("finger2", ball, "0.08 -0.0002 0"), joint("finger2", "body", "0 -0.02 0.3", "0 0 1", follows)]
+    (tmp_path / "gripping.urdf").write_text(f'<robot name="gripping">{"".join(parts)}</robot>')
+    climber = climber_of(ClimberRequest(str(tmp_path / "gripping.urdf"), limbs=("foot0,foot1,foot2",), hold="point"))
+    pair = next(pair for pair in climber.robot.self_pairs or () if set(pair) == {"finger1", "finger2"})
+    assert Links(climber.robot).place(np.zeros((1, climber.robot.nv))).distance(*pair, 0) < SPARE
+    course = draw("stairs", size_of(climber))
+    stance = first_stance(climber, course.scene, placed(climber, course.start))
+    assert min(stance.contacts) >= 0
 
 
 def test_postures_that_are_stated_stay() -> None:

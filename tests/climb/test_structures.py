@@ -11,20 +11,18 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from bench.climb.structures import SCARCE, structure
 from tests.climb.arriving import arrives
-from tests.climb.structures import OBSTRUCTED, SCARCE, structure
 from wbc.climb import BodyPlace, ClimbLoop, first_stance, machines, motion, plan_climb
 from wbc.climb.checker import check
 from wbc.climb.climber import Climber
 from wbc.climb.grids import GRIDS
-from wbc.climb.loop.records import scene_digest
 from wbc.climb.motion import MoveError, Mover
 from wbc.climb.places import body_frames, body_over
 from wbc.climb.scene import ClimbScene, SceneBody
 from wbc.climb.search import StanceWay, find_stances
 from wbc.climb.stance import FREE_LIMB, Stance
 from wbc.climb.world import ClimbWorld, PostureOutcome
-from wbc.errors import UnknownNameError
 from wbc.shapes import Sphere
 
 
@@ -39,23 +37,6 @@ def asked(family: str, seed: int) -> tuple[ClimbScene, Stance, BodyPlace]:
     first, last = (body_over(walker(), frame) for frame in (course.start, course.goal))
     start = first_stance(walker(), course.scene, walker().with_body(walker().rest, first))
     return course.scene, start, BodyPlace(last.translation, last.rotation)
-
-
-@pytest.mark.parametrize("family", [*OBSTRUCTED, *SCARCE])
-def test_structures_are_those_of_their_seeds(family: str) -> None:
-    course, again, other = (structure(family, seed) for seed in (0, 0, 1))
-    scene = course.scene
-    assert scene_digest(scene) == scene_digest(again.scene) != scene_digest(other.scene)
-    assert 0.8 < np.linalg.norm(course.goal.translation - course.start.translation) < 4.0
-    # No hold is inside of anything
-    for body in scene.bodies.values():
-        assert isinstance(body, SceneBody)
-        assert body.distances(scene.positions).min() > -1e-9
-
-
-def test_an_unknown_family_is_refused() -> None:
-    with pytest.raises(UnknownNameError, match="spiral"):
-        structure("spirals", 0)
 
 
 @pytest.mark.parametrize("family", SCARCE)

@@ -101,7 +101,7 @@ def test_a_plan_that_does_not_begin_as_the_robot_goes_is_refused() -> None:
     loop = ClimbLoop(plan, backend="vm")
     for _ in range(50):
         loop.tick()
-    with pytest.raises(RangeError, match="begins where the steady loop is"):
+    with pytest.raises(RangeError, match="begins within 1e-06 m and rad of the robot"):
         loop.go_over(plan)
 
 

@@ -120,7 +120,6 @@ def collision_loop(where: str) -> Loop:
     return collisions.build(where)
 
 
-@pytest.mark.compiled
 @pytest.mark.parametrize(("name", "where"), covering(COLLISIONS, CONSTRAINT_ROBOTS))
 def test_distances_stay_while_the_hand_is_pulled_into_things(name: str, where: str) -> None:
     COLLISIONS[name](collision_loop(where))

@@ -6,12 +6,14 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+import wbc
 from tests.backends import COMPILED, IN_PYTHON, way
 from tests.controller.stacks import FRAMES, arm, robot
 from tests.models import placement
+from tests.repeats import repeats
 from wbc.api import Controller
 from wbc.errors import SolverError, UnknownNameError
-from wbc.tasks import Hold
+from wbc.tasks import EndEffector, Hold, JointLimits
 
 #: Displacement of whole ticks
 STEP = 1e-5
@@ -112,3 +114,25 @@ def test_what_has_no_derivative_is_refused(tick: Controller) -> None:
     assert relaxed.status == "relaxed"
     with pytest.raises(SolverError, match="every row holds"):
         relaxed.derivative("q")
+
+
+@pytest.mark.parametrize("seed", range(repeats(3)))
+def test_directions_that_only_damping_decides(seed: int) -> None:
+    """A position at a weight of 1000 beside a damping of 1e-8, against differences of fourth order of whole ticks."""
+    bot, frame = wbc.robots.load("panda"), FRAMES["panda"].tip
+    stack = wbc.Stack(bot, dt=0.005).add(EndEffector(frame, kind="position"), name="hand", weight=1e3)
+    controller, still = stack.add(JointLimits(), name="limits").compile(backend="vm"), np.zeros(bot.nv)
+    q = bot.integrate(bot.neutral, np.random.default_rng(seed).uniform(-0.4, 0.4, bot.nv))
+    controller.reset(q)
+    controller["hand"].target = bot.pose(q, frame).translation + [2e-3, -1e-3, 3e-3]
+
+    def changed(direction: np.ndarray) -> np.ndarray:
+        return np.asarray(
+            np.subtract(*(controller.step(bot.integrate(q, x), still).v for x in (direction, -direction)))
+        )
+
+    far = 1e-3
+    due = np.transpose([(8.0 * changed(far * e) - changed(2.0 * far * e)) / (12.0 * far) for e in np.eye(bot.nv)])
+    near = pytest.approx(due, abs=2e-4 * np.abs(due).max())
+    assert controller.step(q, still).derivative("q") == near
+    assert controller.batch(2).step(np.stack([q, q]), np.zeros((2, bot.nv))).derivative("q")[1] == near

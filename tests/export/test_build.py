@@ -13,8 +13,11 @@ from tests.repeats import ALL, MORE
 from tests.stack import small
 from wbc.tasks import EndEffector, JointLimits, Posture
 
+#: The UR5 is exported in test_command.py, and built for aarch64 in machines.py where there is qemu
+BUILT = [name for name in CASES if name != "ur5"]
 
-@pytest.mark.parametrize("name", CASES)
+
+@pytest.mark.parametrize("name", BUILT)
 def test_a_thousand_states_agree(name: str, root: Path) -> None:
     folder = exported(name, root)
     done = run("make", "run", f"CFLAGS={' '.join(STRICT)}", folder=folder)
@@ -40,7 +43,7 @@ def test_the_check_finds_a_difference(root: Path) -> None:
     assert run("./check", "none.bin", folder=folder).returncode == 2
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", BUILT)
 def test_no_step_uses_the_heap(name: str, root: Path) -> None:
     folder = exported(name, root)
 
@@ -62,7 +65,7 @@ def test_no_step_uses_the_heap(name: str, root: Path) -> None:
     assert (code, said) == (9, "the heap was used within a step\n")
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", BUILT)
 def test_there_is_no_global_state_and_no_name_but_ours(name: str, root: Path) -> None:
     folder = exported(name, root)
     listed = run("nm", "libwbc_tick.a", folder=folder).stdout
@@ -84,8 +87,6 @@ def made(kind: str) -> wbc.Stack:
         stack.add(wbc.tasks.FrameVelocityLimit("tip", linear=0.5), name="speed")
     elif kind == "only bounds":
         stack.add(JointLimits(), name="limits")
-    elif kind == "only a posture":
-        stack.add(Posture(), name="posture")
     else:
         stack.add(EndEffector("tip", kind="position"), name="hand")
         stack.add(Posture(), name="posture")
@@ -97,7 +98,6 @@ def made(kind: str) -> wbc.Stack:
     [
         ("only rows", QUICK),
         ("only bounds", QUICK),
-        ("only a posture", QUICK),
         ("linear", QUICK),
         ("curved", "-O2"),
     ],

@@ -115,12 +115,14 @@ def truncated(robot: Robot, q: Array, v: Array, a: Array, change: Array) -> None
 
 
 def run_second_order(robot: Robot, text: str, command: str, count: int, seed: int) -> None:
-    """Every tick is solved and leads to where loops are closed, by a velocity that keeps them closed, within limits;
-    torques are those that MuJoCo says its accelerations need.
+    """Every tick is solved and leads to where loops are closed, by a velocity that keeps them closed, within limits,
+    positions within 1 rad of neutral; torques are those that MuJoCo says its accelerations need.
     """
+    robot = within(robot, 1.0)
     stack = wbc.Stack(robot, DT).add(wbc.tasks.Posture(), name="posture").add(wbc.tasks.JointLimits())
     controller, rng, limits, moved = stack.compile(command=command), np.random.default_rng(seed), robot.limits, 0.0
     motors, q, v = list(robot.motors), robot.neutral, np.zeros(robot.nv)
+    index, has = robot.position_index, robot.position_index >= 0
     for k in range(count):
         if k % EPISODE == 0:
             q, v = robot.neutral, np.zeros(robot.nv)
@@ -142,6 +144,9 @@ def run_second_order(robot: Robot, text: str, command: str, count: int, seed: in
         q, v = np.array(step.q_next), np.array(step.v)
         if k % SPARSE == 0:
             truncated(robot, before, speed, step.a, robot.difference(reached, q))
+        at = q[index[has]]
+        assert (at >= limits.position_lower[has] - 1e-9).all(), k
+        assert (at <= limits.position_upper[has] + 1e-9).all(), k
         assert max(robot.loop_gaps(q).values()) <= 1e-9, k
         assert np.abs(rows_at(robot, q) @ v).max() <= 1e-9, k
         moved = max(moved, float(np.abs(step.v).max()))

@@ -82,3 +82,28 @@ def test_more_joints_without_motors_than_rows_of_loops() -> None:
         controller.reset(q)
         step = controller.step(q, 0.1 * v)
         assert (step.status, step.iterations) == ("solved", 0)
+
+
+@pytest.mark.parametrize("name", [*(name for name in NAMED if name != "parallelogram"), *range(repeats(4))])
+def test_the_last_command_is_a_guess_only(name: str | int) -> None:
+    """Without limits of acceleration a command follows from q: after the command that led there, from rest, and after a
+    velocity that opens loops.
+    """
+    robot = driven(name) if isinstance(name, str) else linkage(name)[1]
+    stack = wbc.Stack(robot, DT).add(wbc.tasks.Posture(), name="posture")
+    stack.add(wbc.tasks.JointLimits(acceleration=False))
+    controller, other = stack.compile(), stack.compile()
+    rng = np.random.default_rng(0)
+    q, target = moving(robot, rng)[0], moving(robot, rng)[0]
+    controller.reset(q)
+    controller["posture"].target = other["posture"].target = target
+    for _ in range(repeats(12)):
+        step = controller.step(q)
+        assert step.status == "solved"
+        assert max(robot.loop_gaps(pin.integrate(robot.model, q, step.v * DT)).values()) <= 1e-9
+        for v in (np.zeros(robot.nv), rng.uniform(-0.9, 0.9, robot.nv)):
+            other.reset(q)
+            again = other.step(q, v)
+            assert again.status == "solved"
+            assert np.abs(again.v - step.v).max() <= 1e-6
+        q = pin.integrate(robot.model, q, step.v * DT)

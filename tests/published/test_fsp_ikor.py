@@ -6,7 +6,6 @@ counts of patterns (20) are in tests/resolvers/test_fsp.py.
 
 from __future__ import annotations
 
-import functools
 import itertools
 import math
 from collections import Counter
@@ -51,8 +50,6 @@ from wbc.published.ikor.settings import AXES
 from wbc.resolvers.fsp import Criterion, best, blocked, joint_row, orthogonal
 from wbc.teleop import Order
 
-#: Published runs that several tests look at
-once = functools.cache(case)
 BENT = np.radians([10, 150, 20, 30, -15, 60, 25])
 #: A line near that of trajectory 1 [m a step]
 LINE = np.array((0.00109315, -0.00329651, -0.00428364))
@@ -141,7 +138,7 @@ def test_2_jacobians_are_derivatives(machine: Any) -> None:
 )
 def test_3_printed_norms(trajectory: str, config: str, count: int) -> None:
     """With the two defects 445 printed values at their noise floor; without them tracking is 5 to 15 times tighter."""
-    as_printed, consistent = (once(trajectory, config, legacy=legacy) for legacy in (True, False))
+    as_printed, consistent = (case(trajectory, config, legacy=legacy) for legacy in (True, False))
     off = differences(as_printed, trajectory, config)
     assert len(off) == count
     assert rms(off) < 3e-4
@@ -154,7 +151,7 @@ def test_3_printed_norms(trajectory: str, config: str, count: int) -> None:
 @pytest.mark.parametrize("config", ["3x7", "3x10"])
 def test_4_fsp_is_the_pseudo_inverse(config: str) -> None:
     """Printed: to 1e-5 of the norms; here the steps to 1e-9."""
-    one, other = (once("1", config, method=method) for method in (Method.FSP, Method.PSEUDO_INVERSE))
+    one, other = (case("1", config, method=method) for method in (Method.FSP, Method.PSEUDO_INVERSE))
     np.testing.assert_allclose(one.q, other.q, atol=1e-9)
     table = printed()["1", config]
     both = np.isfinite(table.fsp) & np.isfinite(table.pseudo_inverse)
@@ -180,7 +177,7 @@ def test_4_fsp_is_the_pseudo_inverse(config: str) -> None:
 )
 def test_3_all_printed_norms(trajectory: str, config: str, count: int, median: float, differ: dict[str, int]) -> None:
     """All 1973, from joints in whole degrees at both ends; every one within 1e-3 or of the reason that stands here."""
-    run = once(trajectory, config)
+    run = case(trajectory, config)
     off = differences(run, trajectory, config)
     assert (len(off), np.median(np.abs(off)) < median) == (count, True)
     assert Counter(row[-1] for row in unmatched(run, trajectory, config)) == differ
@@ -254,7 +251,7 @@ def test_13_printed_singularity_with_and_without_a_limit_of_steps() -> None:
     """Printed: 1471.66 deg^2 at step 189 of 234, 38.4 degrees in one step, from which FSP and the pseudo-inverse
     differ by 1e-4 at most.
     """
-    wild, plain = (once("2", "6x7", method=method) for method in (Method.FSP, Method.PSEUDO_INVERSE))
+    wild, plain = (case("2", "6x7", method=method) for method in (Method.FSP, Method.PSEUDO_INVERSE))
     assert (wild.norms.argmax() + 1, wild.norms.max()) == (189, pytest.approx(1471.66, rel=1e-3))
     assert math.sqrt(wild.norms.max()) == pytest.approx(38.4, abs=0.1)
     np.testing.assert_allclose(wild.norms, plain.norms, rtol=1e-4)
@@ -688,7 +685,7 @@ def test_loop_back_never_misses_more_and_sometimes_less() -> None:
 
 
 def test_damping_makes_short_steps() -> None:
-    plain, damped = (once("2", "6x7", damping=d) for d in (0.0, 0.1))
+    plain, damped = (case("2", "6x7", damping=d) for d in (0.0, 0.1))
     assert damped.norms.max() < 0.4 * plain.norms.max()
     assert damped.errors[-1] < 2e-3
 

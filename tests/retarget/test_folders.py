@@ -44,8 +44,10 @@ def walks(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def run(*arguments: str) -> tuple[int, str]:
-    done = CliRunner(env={"COLUMNS": "200"}).invoke(app, ["retarget", *arguments])
+def run(out: Path, *arguments: str | Path) -> tuple[int, str]:
+    """Exit code and output of the command, which writes into a folder."""
+    fixed = ("--robot", "simple_humanoid", "--out", str(out), "--workers", "1", "--no-film")
+    done = CliRunner(env={"COLUMNS": "200"}).invoke(app, ["retarget", *map(str, arguments), *fixed])
     if done.exception is not None and not isinstance(done.exception, SystemExit):
         raise done.exception
     return done.exit_code, done.output
@@ -65,8 +67,8 @@ def test_clips_are_found_in_folders(walks: Path, tmp_path: Path) -> None:
 
 def test_a_folder_is_retargeted_and_gone_on_with(walks: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    options = (str(walks), "--robot", "simple_humanoid", "--out", str(out), "--workers", "1", "--no-film")
-    code, text = run(*options, "--format", "csv", "--format", "gmr")
+    formats = ("--format", "csv", "--format", "gmr")
+    code, text = run(out, walks, *formats)
     assert code == 0, text
     assert "2 of 2 clips" in text
     for place in ("sit", "deep/sit"):
@@ -80,29 +82,18 @@ def test_a_folder_is_retargeted_and_gone_on_with(walks: Path, tmp_path: Path) ->
     assert "gave way: left_leg from 0.1" in (out / "sit" / "report.txt").read_text()
     # The same again does nothing, with another format all, with --force all
     assert len(FakeRetargeter.runs) == 2
-    code, text = run(*options, "--format", "csv", "--format", "gmr")
+    code, text = run(out, walks, *formats)
     assert (code, len(FakeRetargeter.runs)) == (0, 2)
     assert "are done already" in text
-    run(*options)
+    run(out, walks)
     assert len(FakeRetargeter.runs) == 4
-    run(*options, "--force")
+    run(out, walks, "--force")
     assert len(FakeRetargeter.runs) == 6
 
 
 def test_a_clip_that_fails_leaves_the_others(walks: Path, tmp_path: Path) -> None:
     (tmp_path / "bad.bvh").write_text("HIERARCHY\n")
-    clip = str(walks / "sit.npz")
-    code, text = run(
-        str(tmp_path / "bad.bvh"),
-        clip,
-        "--robot",
-        "simple_humanoid",
-        "--out",
-        str(tmp_path / "out"),
-        "--workers",
-        "1",
-        "--no-film",
-    )
+    code, text = run(tmp_path / "out", tmp_path / "bad.bvh", walks / "sit.npz")
     assert code == 1
     assert "failed" in text
     assert "cut off" in text
@@ -111,21 +102,17 @@ def test_a_clip_that_fails_leaves_the_others(walks: Path, tmp_path: Path) -> Non
 
 
 def test_ctrl_c_keeps_what_is_done(walks: Path, tmp_path: Path) -> None:
-    names = []
-    for name in ("a", "stop", "z"):
-        file = tmp_path / f"{name}.npz"
+    names, out = [tmp_path / f"{name}.npz" for name in ("a", "stop", "z")], tmp_path / "out"
+    for file in names:
         file.write_bytes((walks / "sit.npz").read_bytes())
-        names.append(str(file))
-    out = tmp_path / "out"
-    options = ("--robot", "simple_humanoid", "--out", str(out), "--workers", "1", "--no-film")
-    code, text = run(*names, *options)
+    code, text = run(out, *names)
     assert code == INTERRUPTED
     assert "1 of 3 clips" in text
     assert FakeRetargeter.runs == ["a", "stop"]
     assert (out / "a" / "report.json").is_file()
     assert not (out / "z").exists()
     # And goes on
-    code, text = run(names[0], names[2], *options)
+    code, text = run(out, names[0], names[2])
     assert code == 0
     assert FakeRetargeter.runs == ["a", "stop", "z"]
 
@@ -142,10 +129,7 @@ def test_processes_answer_for_clips_that_cannot_be_read(tmp_path: Path) -> None:
 
 
 def test_results_as_json(walks: Path, tmp_path: Path) -> None:
-    clip = str(walks / "sit.npz")
-    code, text = run(
-        clip, "--robot", "simple_humanoid", "--out", str(tmp_path / "o"), "--workers", "1", "--no-film", "--json"
-    )
+    code, text = run(tmp_path / "o", walks / "sit.npz", "--json")
     assert code == 0
     assert json.loads(text)["clips"][0]["frames"] == 12
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.retarget import clips
+from tests.retarget import clips, motions
 from tests.retarget.hand_clips import hand
 from wbc import robots
 from wbc.retarget import BodyError, Clip, Retargeter, folders, load_clip
@@ -74,6 +74,22 @@ def test_orders_of_points_and_what_no_finger_leads(tmp_path: Path) -> None:
     np.savez(tmp_path / "few.npz", points=points[:, few], names=[names[k] for k in few], fps=30)
     skeleton = load_clip(tmp_path / "few.npz").skeleton
     assert "ring has nobody to follow" in " ".join(correspondence(body, skeleton).notes)
+
+
+@pytest.mark.parametrize(("unit", "length"), [("millimetres", 1e-3), ("centimetres", 1e-2), ("", 1.0)])
+@pytest.mark.parametrize("size", [0.6, 1.2])
+def test_the_unit_is_that_of_a_hand(tmp_path: Path, unit: str, length: float, size: float) -> None:
+    for names in ("mediapipe-hand", "mano", "mano-tips"):
+        order = {"mano": MANO[:16], "mano-tips": MANO}.get(names, list(range(21)))
+        points = size * hand()[0][:, order]
+        clip = loaded(tmp_path, points / length, names=names, up="z")
+        np.testing.assert_allclose(np.ptp(clip.points, axis=1), np.ptp(points, axis=1), atol=1e-9)
+        assert unit in " ".join(clip.notes)
+    # A dog whose names say nothing is no hand
+    dog = motions.nameless(clips.dog(0, 20.0).clip.skeleton)
+    np.savez(tmp_path / "dog.npz", points=clips.dog(0, 20.0).clip.points / length, parents=dog.parents, names=dog.names)
+    found = load_clip(tmp_path / "dog.npz", rate=20.0, up="z")
+    assert np.ptp(found.points) == pytest.approx(np.ptp(clips.dog(0, 20.0).clip.points))
 
 
 def test_what_is_no_hand() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 from dataclasses import replace
 
@@ -12,7 +13,7 @@ from tests.retarget import clips, motions
 from wbc.multibody import pin
 from wbc.retarget import Retargeted, Retargeter, engine
 from wbc.retarget.engine import Engine
-from wbc.retarget.plan import MotionPlan
+from wbc.retarget.targets import Targets
 
 
 @functools.cache
@@ -20,19 +21,17 @@ def seated() -> tuple[Engine, Retargeted]:
     """Who comes to sit with both feet on the ground, and the engine that made the motion."""
     made = Retargeter("simple_humanoid")
     motion = made.run(motions.part(clips.sit().clip, 0.0, 1.0))
-    return made.engine(tuple(motion.plan.limbs), motion.plan.dt, head=motion.plan.head is not None), motion
+    return made.engine(motion.plan.limbs, motion.plan.dt, head="head" in motion.plan.turns), motion
 
 
-def reaching(motion: Retargeted, away: float) -> MotionPlan:
+def reaching(motion: Retargeted, away: float) -> Targets:
     """The left hand stands so far to the left of where it is, from the first tick on, and is held from the tenth on."""
-    plan, arm = motion.plan, motion.plan.limbs["left_arm"]
+    plan, arm = copy.deepcopy(motion.plan), motion.plan.limbs.index("left_arm")
     _, positions = motions.places(motion, motion.body.limbs["left_arm"].end)
-    place = positions[plan.ticks // 2] + np.array([0.0, away, 0.0])
-    ticks = np.arange(plan.ticks)
-    hand = replace(
-        arm, end=np.tile(place, (plan.ticks, 1)), stands=ticks >= 0, held=ticks >= 10, lies=np.zeros(plan.ticks, bool)
-    )
-    return replace(plan, limbs={**plan.limbs, "left_arm": hand})
+    plan.chains[:, arm, 3] = positions[len(positions) // 2] + np.array([0.0, away, 0.0])
+    plan.stands[:, arm], plan.lies[:, arm] = True, False
+    plan.held[:, arm] = np.arange(len(plan.held)) >= 10
+    return plan
 
 
 @pytest.mark.parametrize("away", [0.1, 0.2])
@@ -51,9 +50,10 @@ def test_a_hand_that_is_held_late_gives_way_to_the_feet(away: float, monkeypatch
 def test_feet_stay_above_ground_where_they_cannot_all_stand(away: tuple[float, float, float]) -> None:
     """The left foot stands farther from the right one than legs reach; held there, one sinks by 5 to 11 cm."""
     made, motion = seated()
-    leg, always = motion.plan.limbs["left_leg"], np.ones(motion.plan.ticks, dtype=bool)
-    far = replace(leg, end=leg.end + np.array(away), stands=always, held=always)
-    q, gave = made.run(replace(motion.plan, limbs={**motion.plan.limbs, "left_leg": far}))
+    far, leg = copy.deepcopy(motion.plan), motion.plan.limbs.index("left_leg")
+    far.chains[:, leg, 3] += away
+    far.stands[:, leg] = far.held[:, leg] = True
+    q, gave = made.run(far)
     assert gave == []
     for limb in ("left_leg", "right_leg"):
         foot = motion.body.limbs[limb]
@@ -63,11 +63,10 @@ def test_feet_stay_above_ground_where_they_cannot_all_stand(away: tuple[float, f
 
 def test_ticks_of_a_plan_are_those_of_one_at_a_time() -> None:
     made, motion = seated()
-    places, turns = made.targets(motion.plan)
+    places, turns = made.table(motion.plan)
     rows = made.rows(places, turns)
-    held = {name: limb.grip(0) for name, limb in motion.plan.limbs.items()}
     q = np.empty((21, made.robot.nq))
-    q[0] = made.start(places, turns, held)
+    q[0] = made.start(places, turns, motion.plan.grips(0))
     v = made.controller.last_command
     made._ticks.most = np.inf
     assert made._ticks.run(rows[:20], q) == (20, None)

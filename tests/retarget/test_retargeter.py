@@ -109,16 +109,14 @@ def test_soles_do_not_sink_by_the_robot_files_own_bodies() -> None:
 def test_targets_of_one_who_crawls_lie_on_the_ground_and_not_in_it(name: str) -> None:
     clip = motions.part(clips.crawl().clip, 0.4, 3.4)
     match = Retargeter(name).correspondence(clip.skeleton)
-    places = Mapper(match).places(clip.points, clip.turns, stances_of(match, clip).ankle)
-    for limb, targets in places.limbs.items():
+    targets = Mapper(match, clip.rate).targets(clip.points, clip.turns, stances_of(match, clip).ankle)
+    for limb, chain in zip(targets.limbs, targets.chains.transpose(1, 2, 0, 3), strict=True):
         lies = match.body.limbs[limb].thickness
-        assert targets.middle[:, 2].min() > lies[0]
+        assert chain[1, :, 2].min() > lies[0]
         if limb.endswith("arm"):
-            assert targets.wrist[:, 2].min() > lies[1]
-            assert targets.end[:, 2].min() > lies[2]
+            assert (chain[2:, :, 2].min(axis=1) > lies[1:]).all()
             # Bones that are turned are as long as before
-            assert np.ptp(np.linalg.norm(targets.wrist - targets.middle, axis=1)) < 1e-12
-            assert np.ptp(np.linalg.norm(targets.end - targets.wrist, axis=1)) < 1e-12
+            assert np.ptp(np.linalg.norm(np.diff(chain[1:], axis=0), axis=2), axis=1).max() < 1e-12
 
 
 def test_all_links_of_one_who_crawls_stay_above_ground_as_they_are_drawn() -> None:
@@ -166,11 +164,12 @@ def test_an_arm_on_the_ground_does_not_roll_from_corner_to_corner(arm: str) -> N
 @pytest.mark.parametrize("side", ["left", "right"])
 def test_a_foot_on_its_toes_is_no_steeper_against_its_shank_than_its_ankle_turns(side: str) -> None:
     found = motion("g1", "crawl", 0.4, 3.4)
-    robot, leg, limb = found.robot, found.body.limbs[f"{side}_leg"], found.plan.limbs[f"{side}_leg"]
+    robot, name, plan = found.robot, f"{side}_leg", found.plan
+    leg, number = found.body.limbs[name], plan.limbs.index(name)
     knee, ankle, sole = (robot.pose(robot.neutral, frame) for frame in (leg.middle, leg.wrist, leg.end))
     rest = sole.rotation.T @ (knee.translation - ankle.translation)
-    assert limb.rotation is not None
-    shanks = np.einsum("tji,tj->ti", limb.rotation, limb.middle - limb.wrist)[limb.stands]
+    shanks = np.einsum("tji,tj->ti", plan.turns[name], plan.chains[:, number, 1] - plan.chains[:, number, 2])
+    shanks = shanks[plan.stands[:, number]]
     angles = np.arctan2(rest[0], rest[2]) - np.arctan2(shanks[:, 0], shanks[:, 2])
     hinge = robot.dof_names.index(f"{side}_ankle_pitch_joint")
     assert robot.limits.position_lower[hinge] < angles.min()
@@ -181,19 +180,19 @@ def test_a_foot_on_its_toes_is_no_steeper_against_its_shank_than_its_ankle_turns
 def test_knees_are_planned_between_hips_and_ankles_where_the_robot_bends(name: str, kind: str) -> None:
     found = motion(name, kind, 0.4, 2.4)
     for limb in ("left_leg", "right_leg"):
-        leg, plan = found.body.limbs[limb], found.plan.limbs[limb]
-        thighs, shanks = plan.middle - plan.base, plan.wrist - plan.middle
+        leg, plan, number = found.body.limbs[limb], found.plan, found.plan.limbs.index(limb)
+        hip, knee, ankle, _ = np.moveaxis(plan.chains[:, number], 1, 0)
+        thighs, shanks = knee - hip, ankle - knee
         # Ends that are out of reach, and knees that lie on the ground, are apart from each other
-        near = np.linalg.norm(plan.wrist - plan.base, axis=1) < 0.99 * sum(leg.lengths)
-        near &= plan.middle[:, 2] > leg.thickness[0] + 0.2
+        near = np.linalg.norm(ankle - hip, axis=1) < 0.99 * sum(leg.lengths)
+        near &= knee[:, 2] > leg.thickness[0] + 0.2
         assert near.sum() > 0.3 * len(near) or kind == "crawl"
         assert np.allclose(np.linalg.norm(thighs[near], axis=1), leg.lengths[0], atol=1e-3)
         assert np.allclose(np.linalg.norm(shanks[near], axis=1), leg.lengths[1], atol=1e-3)
         ahead = np.cross(thighs, shanks) * leg.bend
-        assert (np.einsum("ti,ti->t", ahead, found.plan.turn[:, :, 1])[near] > -1e-9).all()
+        assert (np.einsum("ti,ti->t", ahead, plan.turns["pelvis"][:, :, 1])[near] > -1e-9).all()
         # Feet are where ankles can hold them
-        assert plan.rotation is not None
-        lean = -np.einsum("tji,tj->ti", plan.rotation, shanks)[near & ~plan.stands]
+        lean = -np.einsum("tji,tj->ti", plan.turns[limb], shanks)[near & ~plan.stands[:, number]]
         angles = np.arctan2(lean[:, 0], lean[:, 2])
         assert (-angles > leg.pitch[0] - 0.1).all()
         assert (-angles < leg.pitch[1] + 0.1).all()

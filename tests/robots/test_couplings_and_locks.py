@@ -87,6 +87,21 @@ def test_what_followers_leave_of_a_leaders_range_is_said_and_nothing_is_refused(
     assert min(ends.values()) > 0, ends
 
 
+@pytest.mark.parametrize("offset", [-0.2, 0.9])
+def test_a_ratio_of_0_holds_a_joint_within_its_range_or_the_file_is_refused(offset: float) -> None:
+    bodies = "".join(
+        f'<body><joint name="{name}" range="-.5 .5"/><geom size=".1"/></body>' for name in ("lead", "follow")
+    )
+    text = f"""<mujoco><compiler angle="radian"/><worldbody>{bodies}</worldbody><equality>
+<joint joint1="follow" joint2="lead" polycoef="{offset} 0 0 0 0"/></equality></mujoco>"""
+    if offset > 0.5:
+        with pytest.raises(BoundsError, match=r"limits of follow: no value is left: it stands at 0.9, whatever lead"):
+            wbc.robots.load(text)
+        return
+    robot = wbc.robots.load(text)
+    assert robot.neutral[robot.dofs("follow")] == [offset]
+
+
 def test_bad_locks() -> None:
     with pytest.raises(UnknownNameError) as caught:
         wbc.robots.load("panda", lock=["panda_joint33"])

@@ -188,6 +188,32 @@ def test_a_stage_is_the_robot_that_it_was_made_of(seed: int, tmp_path: Path) -> 
     assert np.allclose(pin.crba(robot.model, robot.model.createData(), q), mass, atol=1e-5 * np.abs(mass).max())
 
 
+def test_bodies_of_instances_are_bodies(tmp_path: Path) -> None:
+    import pxr  # noqa: F401
+
+    api = '(prepend apiSchemas = ["PhysicsRigidBodyAPI", "PhysicsMassAPI"])'
+    body = "{{\nfloat physics:mass = {}\nfloat3 physics:diagonalInertia = (1, 1, 1)\n}}\n"
+    (tmp_path / "x.usda").write_text(
+        f"""#usda 1.0
+(metersPerUnit = 1)
+class Xform "arm" {{
+def Xform "hand" {api} {body.format(2)}}}
+def Xform "left" (
+instanceable = true
+prepend references = </arm>
+) {{
+}}
+def Xform "base" {api} {body.format(3)}
+def PhysicsRevoluteJoint "wrist" {{
+rel physics:body0 = </base>
+rel physics:body1 = </left/hand>
+}}"""
+    )
+    robot = wbc.robots.load(tmp_path / "x.usda")
+    assert (robot.base, robot.joint_names) == ("floating", ("root_joint", "wrist"))
+    assert pin.computeTotalMass(robot.model) == 5.0
+
+
 def test_what_a_stage_cannot_say_is_refused_by_name(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     import pxr  # noqa: F401
 
@@ -205,7 +231,9 @@ def test_what_a_stage_cannot_say_is_refused_by_name(tmp_path: Path, caplog: pyte
     file.write_text(head.format(more=', "PhysicsMassAPI"', mass=given) + distance)
     assert_refused(lambda: wbc.robots.load(file), RobotFileError, "PhysicsDistanceJoint")
     moon = 'def PhysicsScene "scene" {\nfloat physics:gravityMagnitude = 1.62\n}\n'
-    file.write_text(head.format(more=', "PhysicsMassAPI", "PhysxRigidBodyAPI"', mass=given) + moon)
+    more = ', "PhysicsMassAPI", "PhysxRigidBodyAPI", "NewtonMimicAPI"'
+    file.write_text(head.format(more=more, mass=given) + moon + 'def MjcActuator "motor" {\n}\n')
     robot = wbc.robots.load(file)
     assert robot.base == "floating"
-    assert "not represented: PhysxRigidBodyAPI of a; gravity of 1.62 m/s^2, which is 9.81 here" in caplog.text
+    assert robot.model.gravity.linear == pytest.approx([0.0, 0.0, -1.62])
+    assert "not represented: PhysxRigidBodyAPI, NewtonMimicAPI of a; MjcActuator of motor\n" in caplog.text

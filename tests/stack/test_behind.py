@@ -18,8 +18,7 @@ import numpy as np
 import pytest
 
 from tests.constraints import test_rows_by_need
-from tests.controller.stacks import DT, arm, everything, humanoid, randomise
-from tests.levels import arms
+from tests.controller.stacks import DT, arm, everything, randomise
 from tests.repeats import repeats
 from tests.stack import small
 from tests.torque import problems
@@ -38,12 +37,8 @@ PATIENCE = 120.0
 FAMILY: dict[str, Callable[[], tuple[Stack, str]]] = {
     "small": lambda: (small.stack(), "velocity"),
     "panda": lambda: (everything("panda"), "velocity"),
-    "ur5, plain": lambda: (everything("ur5", calm=False), "velocity"),
-    "humanoid": lambda: (humanoid(), "velocity"),
     "measured": lambda: (test_rows_by_need.stack(test_rows_by_need.panda(8.0), 3), "velocity"),
-    "levels": lambda: (arms.levels(), "velocity"),
     "torque": lambda: (problems.stack("panda"), "torque"),
-    "acceleration": lambda: (arm("panda"), "acceleration"),
 }
 
 
@@ -134,7 +129,7 @@ def test_clones_change_over_too(gate: threading.Event) -> None:
 
 
 def test_it_changes_under_threads_that_tick(gate: threading.Event) -> None:
-    stack, wrong = arm("panda"), []
+    stack, wrong = small.stack(), []
     first = stack.compile()
     crew = [first, first.clone(), first.clone()]
 
@@ -253,8 +248,8 @@ def test_a_library_of_another_layout_is_refused(tmp_path: pathlib.Path, caplog: 
 
 def test_a_change_that_is_interrupted_is_done_again(gate: threading.Event, monkeypatch: pytest.MonkeyPatch) -> None:
     """Ctrl-C between any two instructions of the change: the tick goes on here or there, to the same bits."""
-    wanted = [state.tobytes() for state in states(arm("panda").compile(backend="vm"), 12)]
-    original = arm("panda").compile()
+    wanted = [state.tobytes() for state in states(small.stack().compile(backend="vm"), 12)]
+    original = small.stack().compile()
     gate.set()
     assert changes(original)
     lines, counted = 0, True

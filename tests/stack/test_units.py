@@ -221,13 +221,13 @@ def row_in(unit: str) -> Expression:
     return Expression(lambda kin, p: many * (kin.position("tip")[1] - 0.3), units=unit)
 
 
-@pytest.mark.parametrize(("unit", "backend"), [*((u, "vm") for u in KNOWN), ("deg", "native")])
-def test_a_row_costs_the_same_in_every_unit(unit: str, backend: str) -> None:
+@pytest.mark.parametrize("unit", KNOWN)
+def test_a_row_costs_the_same_in_every_unit(unit: str) -> None:
     """Against a posture that wants something else, and the tolerance of inverse kinematics with it."""
     base, answers = {"m": "m", "rad": "rad"}.get(unit, "rad" if unit in ("mrad", "deg") else "m"), []
     for each in (base, unit):
         stack = Stack(arm(), 0.01).add(row_in(each), name="row").add(Posture(), name="posture", weight=0.3)
-        tick = stack.add(JointLimits(), name="limits").compile(backend=backend)
+        tick = stack.add(JointLimits(), name="limits").compile(backend="vm")
         tick["posture"].target = (0.0, 0.0)
         answers.append(tick.step((0.3, 0.8)).v)
         tick["row"].weight = 7.0

@@ -9,6 +9,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.multibody import pin
+from wbc.qp.sensitivity import Squares, force_between
 from wbc.tick.context import Context
 from wbc.tick.native import NativeTick
 from wbc.validation import Array
@@ -29,7 +30,8 @@ class Derivatives:
 
         H dv + C_S' dlam = -(dH v + dg + dC_S' lam),      C_S dv = db_S - dC_S v
 
-    for the rows S that hold v. The numbers' own derivatives are central differences in C.
+    for the rows S that hold v. The numbers' own derivatives are central differences in C, those of H and g by
+    :func:`~wbc.qp.sensitivity.force_between`.
 
     Attributes:
         size: numbers of a QP, see :meth:`assembled`.
@@ -65,7 +67,8 @@ class Derivatives:
         # Accelerations count from where the tick found them
         self._given(before, "v_last")[:] = self._given(before, "v_in")
         x, force = reports[:, memory["v"]], reports[:, memory["multipliers"]]
-        H, _, A, low, high = self.problems(before)
+        middle, A, low, high = self.problems(before)
+        H = middle.H
         holds = (force != 0.0) | (low == high)
         rows = np.concatenate([np.broadcast_to(np.eye(n), (len(x), n, n)), A], axis=1) * holds[:, :, None]
         diagonal = np.where(holds, -REGULAR / H.max(axis=(1, 2))[:, None], 1.0)
@@ -76,11 +79,13 @@ class Derivatives:
                 moved = before.copy()
                 moves(moved, k, by)
                 ends.append(self.problems(moved))
+            (up, *numbers), (down, *others) = ends
+            pushed = force_between(up, middle, down, x) / (2.0 * _STEP)
             with np.errstate(invalid="ignore"):
-                dH, dg, dA, dlow, dhigh = ((up - down) / (2.0 * _STEP) for up, down in zip(*ends, strict=True))
+                dA, dlow, dhigh = ((more - less) / (2.0 * _STEP) for more, less in zip(numbers, others, strict=True))
                 side = np.nan_to_num(np.where(force > 0.0, dhigh, dlow), posinf=0.0, neginf=0.0)
             along = np.einsum("rij,rj->ri", dA, x)
-            right[:, :n, k] = -(np.einsum("rij,rj->ri", dH, x) + dg + np.einsum("rij,ri->rj", dA, force[:, n:]))
+            right[:, :n, k] = -(pushed + np.einsum("rij,ri->rj", dA, force[:, n:]))
             right[:, n:, k] = holds * (side - np.concatenate([np.zeros_like(x), along], axis=1))
         return _solved(H, rows, diagonal, right)[:, : self._context.nv]
 
@@ -88,21 +93,26 @@ class Derivatives:
         where, start = self._context.memory[name], self._context.memory.report
         return inputs[:, where.start - start : where.stop - start]
 
-    def problems(self, inputs: Array) -> tuple[Array, Array, Array, Array, Array]:
-        """H, g, A, lower and upper bounds of all."""
-        layout, memory, found = self._context.layout, self._context.memory, self.assembled(inputs)
-        n, m = layout.variables, layout.general_rows
+    def problems(self, inputs: Array) -> tuple[Squares, Array, Array, Array]:
+        """What H and g are made of, A, lower and upper bounds of all."""
+        layout, memory = self._context.layout, self._context.memory
+        n, m, rows = layout.variables, layout.general_rows, layout.task_rows
+        tasks = np.empty((len(inputs), rows * (n + 2)))
+        found = self.assembled(inputs, tasks)
         H, g, A, low, high = (
             found[:, memory[name].start - self._base : memory[name].stop - self._base]
             for name in ("H", "g", "A", "low", "high")
         )
         upper = np.triu(H.reshape(len(found), n, -1)[:, :, :n])
-        return upper + np.triu(upper, 1).transpose(0, 2, 1), g[:, :n], A.reshape(len(found), m, n), low, high
+        J, desired, weight = np.split(tasks, [rows * n, rows * (n + 1)], axis=1)
+        whole = upper + np.triu(upper, 1).transpose(0, 2, 1)
+        made = Squares(whole, g[:, :n], J.reshape(len(found), rows, n), weight, desired)
+        return made, A.reshape(len(found), m, n), low, high
 
-    def assembled(self, inputs: Array) -> Array:
-        """The QPs as C has them, a row a robot."""
+    def assembled(self, inputs: Array, tasks: Array | None = None) -> Array:
+        """The QPs as C has them, a row a robot; J, desired rates and weights of task rows into ``tasks``."""
         given, found = np.ascontiguousarray(inputs), np.empty((len(inputs), self.size))
-        places = (ctypes.c_void_p(array.ctypes.data) for array in (given, found))
+        places = (ctypes.c_void_p(0 if array is None else array.ctypes.data) for array in (given, found, tasks))
         self._many(self._tick.pointer, ctypes.c_longlong(len(given)), *places)
         return found
 

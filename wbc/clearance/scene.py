@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf
+from math import ceil, inf, pi
 from typing import Any
 
 import numpy as np
@@ -17,6 +17,7 @@ from wbc.multibody import pin
 from wbc.robot import Robot
 from wbc.shapes import Geometry, HalfSpace, Solid
 from wbc.shapes.solid import Kind, why_apart
+from wbc.shapes.surfaces import between_rows
 from wbc.validation import Array
 
 
@@ -50,6 +51,18 @@ class EndlessCylinder(_Endless):
 #: Those that have no end, and are fixed in the world
 Unbounded = HalfSpace | CylinderInside | EndlessCylinder
 Shape = Solid | TriangleMesh | Unbounded
+
+
+def patch_of(shape: Unbounded, low: Sequence[float], high: Sequence[float], facets: int) -> Array:
+    """Triangles of a part of a surface without end, ``(n, 3, 3)`` [m]: between bounds of x and y of a half-space [m],
+    of the angle [rad] and z [m] of a cylinder, which has so many facets round it.
+    """
+    if isinstance(shape, HalfSpace):
+        x, y = np.meshgrid([low[0], high[0]], [low[1], high[1]])
+        return between_rows(np.stack([x, y, np.zeros_like(x)], axis=2))
+    count = max(2, ceil((high[0] - low[0]) / (2.0 * pi) * facets - 1e-9) + 1)
+    angle, z = np.meshgrid(np.linspace(low[0], high[0], count), [low[1], high[1]])
+    return between_rows(np.stack([shape.radius * np.cos(angle), shape.radius * np.sin(angle), z], axis=2))
 
 
 @dataclass(frozen=True, eq=False)

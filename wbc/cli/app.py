@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import functools
 import importlib
+import itertools
 import pathlib
 import sys
 from collections.abc import Iterable, Mapping
@@ -157,8 +158,10 @@ class CommandGroup(TyperGroup):
         modes = COMMANDS[name].modes
         mode = rest.pop(0) if rest and rest[0] in modes else ""
         chosen = command(name, mode)
-        placed = any(param.param_type_name == "argument" for param in chosen.params)
-        if rest and not mode and not placed and not rest[0].startswith("-") and not ctx.resilient_parsing:
+        # More words than the first mode takes: the first of them was to be a mode
+        most = sum(param.param_type_name == "argument" for param in chosen.params)
+        words = [*itertools.takewhile(lambda word: not word.startswith("-"), rest)]
+        if len(words) > most and len(modes) > 1 and not mode and not ctx.resilient_parsing:
             raise UnknownNameError("mode", rest[0], modes)
         return f"{name} {mode}".strip(), chosen, rest
 

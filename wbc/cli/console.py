@@ -110,9 +110,11 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]], title: str = "", 
 def show_figures(
     title: str, figures: Iterable[tuple[str, str]], folder: Path | None = None, files: Iterable[Path] = ()
 ) -> None:
-    """Names and texts in two columns; then the folder, and the files in it."""
-    shown = table(("", ""), ((name, escape(text)) for name, text in figures if name), escape(title), left=("",))
+    """A title, names and texts in two columns; then the folder, and the files in it."""
+    shown = table(("", ""), ((name, escape(text)) for name, text in figures if name), left=("",))
     shown.show_header, shown.columns[0].style = False, "cyan"
+    # A title of the table would be broken where its columns are narrower
+    out().print(f"[bold]{escape(title)}[/bold]", soft_wrap=True)
     out().print(shown)
     if folder is not None:
         out().print(f"[bold]{escape(str(folder))}[/bold]: {', '.join(file.name for file in files)}", soft_wrap=True)

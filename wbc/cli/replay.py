@@ -61,7 +61,9 @@ class ReplayRun:
         for note in found.notes:
             tell(note, "note")
         if not found.complete:
-            tell("the recording was not closed; its last ticks may be missing", "note")
+            from wbc.log.file import NOT_CLOSED
+
+            tell(f"the recording {NOT_CLOSED}", "note")
         return 0 if found.identical else DIFFERS
 
 

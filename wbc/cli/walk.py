@@ -74,7 +74,7 @@ class DriveWalk:
     def run(self) -> int:
         from wbc.cli.climbing import carried_out
         from wbc.cli.console import tell
-        from wbc.climb.keyboard import HELP, KeyTwists
+        from wbc.cli.keys import HELP, KeyTwists
         from wbc.terminal import terminal, terminal_keys
 
         request = ClimbRequest(self.mode, self.climber, self.scene, self.plant)

@@ -20,6 +20,8 @@ from wbc.symbolic.joint_steps import place
 from wbc.symbolic.kinematics import frame_index
 from wbc.validation import Array
 
+#: So many motors that lack torque are named
+NAMED = 3
 #: What a share of the weight that contacts cannot balance costs, beside one of a motor's effort
 UNBALANCED = 100.0
 #: What lacks less than this counts as rounding [N m; N; weights]
@@ -97,6 +99,19 @@ class Equilibrium:
         lacks = [("contacts", float(over[:cones].max(initial=0.0) + answer.x[count + len(A) :].sum()))]
         lacks += sorted(zip(names, both.tolist(), strict=True), key=lambda lack: -lack[1])
         return [(name, amount) for name, amount in lacks if amount > COUNTS]
+
+    def told(self, contacts: Sequence[int], lacks: Sequence[tuple[str, float]]) -> str:
+        """In words what of :meth:`lacking` the robot cannot stand without."""
+        robot, forces = self.climber.robot, {"m": "N", "rad": "N m"}
+        units = {name: forces[unit] for name, unit in zip(robot.dof_names, robot.dof_units, strict=True)}
+        limbs = [limb.name for limb, row in zip(self.climber.limbs, contacts, strict=True) if row != FREE_LIMB]
+        parts = [
+            f"{1e2 * amount:.3g} % of its weight" if name == "contacts" else f"{amount:.3g} {units[name]} of {name}"
+            for name, amount in lacks[:NAMED]
+        ]
+        strength = float(np.linalg.norm(self.scene.gravity))
+        on = " and ".join(limbs) or "no limb"
+        return f"under {strength:.3g} m/s^2 it cannot stand on {on}: {', '.join(parts)} are lacking"
 
     def wrench_slacks(self, contacts: Sequence[int], q: Array, point: Array, wrenches: Array) -> tuple[Array, Array]:
         """Slacks of contacts, turned as in a configuration, for wrenches that they have to give, and their bounds: as

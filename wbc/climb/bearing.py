@@ -6,15 +6,12 @@ import numpy as np
 
 from wbc.climb.balance import Equilibrium
 from wbc.climb.plan import ContactPlan
-from wbc.climb.stance import FREE_LIMB
 from wbc.errors import RangeError
 
 #: Share of the efforts that standing still may take; the rest is for motion
 EFFORT_SHARE = 0.9
 #: Time between knots that are looked at, beside those where limbs lift and land [s]
 EVERY = 0.2
-#: So many motors are named
-NAMED = 3
 
 
 def check_borne(plan: ContactPlan, effort: float = EFFORT_SHARE) -> None:
@@ -26,8 +23,7 @@ def check_borne(plan: ContactPlan, effort: float = EFFORT_SHARE) -> None:
     Raises:
         RangeError: the first time at which they do not [s], and what is lacking [N m; N].
     """
-    gravity = float(np.linalg.norm(plan.scene.gravity))
-    if gravity == 0.0 or not len(plan.times):
+    if not np.any(plan.scene.gravity) or not len(plan.times):
         return
     balance, times = Equilibrium(plan.climber, plan.scene), np.asarray(plan.times)
     events = {0.0, float(times[-1]), *(time for move in plan.moves for time in (move.lift, move.land))}
@@ -35,10 +31,5 @@ def check_borne(plan: ContactPlan, effort: float = EFFORT_SHARE) -> None:
     for k in np.unique(np.minimum(rows, len(times) - 1)):
         time = float(times[k])
         held = plan.contacts_at(time)
-        lacks = balance.lacking(held, plan.q[k], effort)
-        if lacks:
-            limbs = [limb.name for limb, row in zip(plan.climber.limbs, held, strict=True) if row != FREE_LIMB]
-            parts = [f"{1e2 * amount:.3g} % of its weight" if name == "contacts" else f"{amount:.3g} N m of {name}"
-                     for name, amount in lacks[:NAMED]]  # fmt: skip
-            reason = f"under {gravity:.3g} m/s^2 it cannot stand on {' and '.join(limbs) or 'no limb'}: "
-            raise RangeError("plan", time, f"{reason}{', '.join(parts)} are lacking, at {time:.2f} s of the plan")
+        if lacks := balance.lacking(held, plan.q[k], effort):
+            raise RangeError("plan", time, f"{balance.told(held, lacks)}, at {time:.2f} s of the plan")

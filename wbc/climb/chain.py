@@ -61,7 +61,7 @@ def library() -> ctypes.PyDLL:
 
 def address_of(array: NDArray[Any]) -> ctypes.c_void_p:
     """Where an array's numbers are, for the compiled code."""
-    return ctypes.c_void_p(array.ctypes.data)
+    return ctypes.c_void_p(array.__array_interface__["data"][0])
 
 
 class LimbTable:

@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 from wbc import pickling, validation
 from wbc.clearance import Exemption, Motion, Nearest, Pair, Sweeper, SweptBody, SweptScene, Tree, bodies_of, self_pairs
 from wbc.climb.climber import Climber
-from wbc.climb.joint_values import joint_values
 from wbc.climb.scene import ClimbScene
 from wbc.climb.stance import FREE_LIMB
 from wbc.errors import ShapeError
 from wbc.geometry.kernel import segments_from
 from wbc.multibody import pin
+from wbc.robot.joint_values import joint_values
 from wbc.shapes import PlacedShape, Sphere
 from wbc.shapes.solid import why_apart
 from wbc.symbolic.kinematics import frame_index

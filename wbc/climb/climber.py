@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from wbc import pickling, validation
 from wbc.climb.contacts import ContactKind, Fixed, PointFoot
-from wbc.climb.joint_values import joint_values, with_joint_values
 from wbc.errors import DuplicateNameError, RangeError, ShapeError, UnsupportedJointError
 from wbc.multibody import pin
 from wbc.robot import Robot
+from wbc.robot.joint_values import joint_values, with_joint_values
 from wbc.rotations import matrices
 from wbc.symbolic.kinematics import frame_index
 from wbc.validation import Array
@@ -95,7 +95,7 @@ class Climber:
                 raise DuplicateNameError("Climber.limbs", name, "two limbs of this name")
         object.__setattr__(self, "limbs", limbs)
         object.__setattr__(self, "name", validation.name("Climber.name", self.name or robot.name))
-        object.__setattr__(self, "height", validation.scalar("Climber.height", self.height, low=0.0, unit="m"))
+        validation.own_scalars(self, "height", low=0.0, unit="m")
         rest = robot.configuration("Climber.rest", robot.neutral if self.rest is None else self.rest)
         rest.flags.writeable = False
         object.__setattr__(self, "rest", rest)
@@ -203,7 +203,9 @@ class Climber:
         return frame * self.limbs[limb].placement
 
     def center_of_mass(self, q: Array) -> Array:
-        """Centre of mass in the world ``(3)`` [m]."""
+        """Centre of mass in the world ``(3)`` [m]; of a robot without masses the origin of its body."""
+        if self.mass <= 0.0:
+            return np.array(self.body_pose(q).translation)
         return np.array(pin.centerOfMass(self.robot.model, self._data, np.asarray(q, dtype=np.float64)))
 
     @cached_property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, Self
@@ -73,18 +72,16 @@ class PointFoot(ContactKind):
 
     Attributes:
         friction: Coulomb's coefficient [1].
-        most: largest normal force [N].
         radius: r of the ball whose centre is the contact frame's origin [m]; 0: that is the point itself.
     """
 
     fixed: ClassVar[Fixed] = "position"
 
     friction: float = 0.5
-    most: float = math.inf
     radius: float = 0.0
 
     def __post_init__(self) -> None:
-        _positive(self, "friction", "most", "radius")
+        validation.own_scalars(self, "friction", "radius", low=0.0, infinite=True)
 
     @property
     def height(self) -> float:
@@ -95,7 +92,7 @@ class PointFoot(ContactKind):
         """Rows: friction, normal, then no moments where it touches."""
         ties = _MOMENTS.copy()
         ties[0, 1], ties[1, 0] = -self.radius, self.radius
-        return _pressing(self.friction, self.most, np.vstack([ties, -ties]))
+        return _pressing(self.friction, np.vstack([ties, -ties]))
 
 
 @dataclass(frozen=True)
@@ -106,15 +103,13 @@ class FlatFoot(ContactKind):
     Attributes:
         half_lengths: X and Y, half of its sides along x and y [m].
         friction: Coulomb's coefficient [1].
-        most: largest normal force [N].
     """
 
     half_lengths: tuple[float, float] = (0.1, 0.05)
     friction: float = 0.5
-    most: float = math.inf
 
     def __post_init__(self) -> None:
-        _positive(self, "friction", "most")
+        validation.own_scalars(self, "friction", low=0.0, infinite=True)
         lengths = validation.real_array("FlatFoot.half_lengths", self.half_lengths, (2,))
         for value in lengths:
             validation.scalar("FlatFoot.half_lengths", value, low=0.0, unit="m")
@@ -129,7 +124,7 @@ class FlatFoot(ContactKind):
         arms = np.array([y, x, 0.5 * self.friction * (x + y)])
         sides = np.vstack([_MOMENTS, -_MOMENTS])
         sides[:, 2] = -np.tile(arms, 2)
-        return _pressing(self.friction, self.most, sides)
+        return _pressing(self.friction, sides)
 
 
 @dataclass(frozen=True)
@@ -151,7 +146,7 @@ class GripHand(ContactKind):
     swivels: bool = False
 
     def __post_init__(self) -> None:
-        _positive(self, "force", "torque")
+        validation.own_scalars(self, "force", "torque", low=0.0, infinite=True)
         validation.flag("GripHand.rolls", self.rolls)
         validation.flag("GripHand.swivels", self.swivels)
 
@@ -188,7 +183,7 @@ class SuctionPad(ContactKind):
     friction: float = 0.5
 
     def __post_init__(self) -> None:
-        _positive(self, "pull", "radius", "friction")
+        validation.own_scalars(self, "pull", "radius", "friction", low=0.0, infinite=True)
 
     def _soles(self, share: float) -> dict[str, Any]:
         return {"radius": share * self.radius}
@@ -203,23 +198,11 @@ class SuctionPad(ContactKind):
 _MOMENTS = np.eye(6)[3:]
 
 
-def _positive(kind: ContactKind, *fields: str) -> None:
-    for field in fields:
-        value = getattr(kind, field)
-        if value != math.inf:
-            value = validation.scalar(f"{type(kind).__name__}.{field}", value, low=0.0)
-        object.__setattr__(kind, field, float(value))
-
-
-def _pressing(friction: float, most: float, moments: Array) -> tuple[Array, Array]:
+def _pressing(friction: float, moments: Array) -> tuple[Array, Array]:
     """Rows of friction and of the normal force, then ``moments`` with b = 0."""
     angles = 2.0 * np.pi * np.arange(FACES) / FACES
     rows = np.zeros((FACES, 6))
     rows[:, 0], rows[:, 1] = np.cos(angles), np.sin(angles)
     rows[:, 2] = -friction * np.cos(np.pi / FACES)
     normal = np.array([[0.0, 0.0, -1.0, 0.0, 0.0, 0.0]])
-    a, b = [rows, normal, moments], [np.zeros(FACES + 1 + len(moments))]
-    if most < math.inf:
-        a.append(-normal)
-        b.append(np.array([most]))
-    return np.vstack(a), np.concatenate(b)
+    return np.vstack([rows, normal, moments]), np.zeros(FACES + 1 + len(moments))

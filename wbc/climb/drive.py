@@ -22,7 +22,7 @@ from wbc.climb.planning import ClimbOptions, plan_climb
 from wbc.climb.scene import ClimbScene
 from wbc.climb.search import NoStancesError, StanceOptions
 from wbc.climb.stance import FREE_LIMB, Stance
-from wbc.climb.turn import BodyTurn, Guide, MovingStance
+from wbc.climb.turn import BodyTurn, Guide
 from wbc.errors import InfeasibleError, RangeError
 from wbc.multibody import pin
 from wbc.validation import Array
@@ -159,24 +159,22 @@ class ClimbDrive:
         if not moves or not loop.steady or any(move.lands == FREE_LIMB for move in moves):
             return None
         contacts = tuple(FREE_LIMB if k in held else row for k, row in enumerate(loop.held))
-        q = reference.q(now)
-        state = MovingStance(contacts, q, reference.derivatives(now)[0])
-        return self._going(plan.scene, state, lambda time: reference.q(now + time), moves)
+        start, v = Stance(contacts, reference.q(now)), reference.derivatives(now)[0]
+        return self._going(plan.scene, start, v, lambda time: reference.q(now + time), moves)
 
     def _meanwhile(self, landing: ContactPlan) -> ContactPlan | None:
         """A landing while the body goes at its twist, from rest; None: none is proven."""
         if not self._twist.any():
             return None
-        state = MovingStance(landing.start, landing.q[0], np.zeros(self.climber.robot.nv))
-        reference = PlanReference(landing, self.climber.robot)
-        return self._going(landing.scene, state, reference.q, landing.moves)
+        start, still = Stance(landing.start, landing.q[0]), np.zeros(self.climber.robot.nv)
+        return self._going(landing.scene, start, still, PlanReference(landing, self.climber.robot).q, landing.moves)
 
     def _going(
-        self, scene: ClimbScene, state: MovingStance, guide: Guide, moves: Sequence[ContactMove]
+        self, scene: ClimbScene, start: Stance, v: Array, guide: Guide, moves: Sequence[ContactMove]
     ) -> ContactPlan | None:
         if self._over is None or self._over.scene is not scene:
             self._over = BodyTurn(self.climber, scene, self.options.motion)
-        return self._over.planned(state, self._twist, guide, moves)
+        return self._over.planned(start, v, self._twist, guide, moves)
 
     def _landing(self, scene: ClimbScene, stance: Stance) -> ContactPlan | None:
         """A limb in the air comes down to a foothold that is near, and the body goes along where the drive ends and it

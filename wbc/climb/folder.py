@@ -90,8 +90,6 @@ def resumed(folder: str | pathlib.Path, at: float | None = None, points: tuple[s
     if not isinstance(request.mode, PathRequest):
         raise RangeError("to", points, "the run went to no place; say where to go")
     passed = 0.0 if request.earlier is None else request.earlier.passed + request.earlier.at
-    when = float(t[-1]) if at is None else validation.scalar("at", at, unit="s")
-    if not t[0] <= when <= t[-1]:
-        raise RangeError("at", when, f"expected a time from {t[0]:g} to {t[-1]:g} s")
+    when = float(t[-1]) if at is None else validation.scalar("at", at, low=float(t[0]), high=float(t[-1]), unit="s")
     mode = replace(request.mode, plan="")
     return replace(request, mode=mode, earlier=EarlierRun(str(place.absolute()), when, passed))

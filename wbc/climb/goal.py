@@ -35,8 +35,7 @@ class BodyPlace:
         object.__setattr__(self, "position", validation.real_array("BodyPlace.position", self.position, (3,)))
         if self.rotation is not None:
             object.__setattr__(self, "rotation", validation.rotation("BodyPlace.rotation", self.rotation))
-        within = validation.scalar("BodyPlace.within", self.within, low=0.0, open_low=True, unit="m")
-        object.__setattr__(self, "within", within)
+        validation.own_scalars(self, "within", low=0.0, open_low=True, unit="m")
 
 
 @dataclass(frozen=True)

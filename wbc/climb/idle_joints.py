@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wbc.climb.climber import Climber
-from wbc.climb.joint_values import joint_values
+from wbc.robot.joint_values import joint_values
 from wbc.robot.pairs.distances import Links, Scenes
 from wbc.symbolic.kinematics import frame_index
 from wbc.validation import Array
@@ -31,8 +31,9 @@ def aside(climber: Climber, reach: float) -> Array:
 
         min over angles of  mean over postures of limbs of  sum over pairs of links of  max(0, 1 - distance / wanted)
 
-    a joint at a time, where that wins more than turning it costs, and links that no limb moves stay ``KEPT`` apart;
-    distances are those of capsules about links, and ``wanted`` is ``KEEPS_OFF`` of the reach [m].
+    a joint at a time, with those that follow it, where that wins more than turning it costs. Distances from limbs are
+    those of capsules about links, and ``wanted`` is ``KEEPS_OFF`` of the reach [m]; pairs that no limb moves count with
+    their own distance and ``KEPT``, and none of them comes nearer than that.
 
     Returns:
         ``(nq)`` [m, rad].
@@ -46,7 +47,10 @@ def aside(climber: Climber, reach: float) -> Array:
     followers = {coupling.follower for coupling in robot.couplings}
     idle = [j for j in range(2, model.njoints) if j not in bearing and int(model.nvs[j]) == 1]
     rows = {j: int(model.idx_vs[j]) - 6 for j in idle if int(model.idx_vs[j]) not in followers}
-    carried = {j: {link for link in robot.shapes if j in above(link)} for j in rows}
+    # A joint carries what those that follow it do
+    joint_of = {int(model.idx_vs[j]): j for j in idle}
+    led = {j: {j, *(joint_of[c.follower] for c in robot.couplings if c.leader == model.idx_vs[j])} for j in rows}
+    carried = {j: {link for link in robot.shapes if led[j] & above(link)} for j in rows}
     moving = {link for link in robot.shapes if climber.carrier(link) >= 0}
     links, limits = Links(robot), robot.coupled(robot.limits)
     low, high = limits.position_lower[6:], limits.position_upper[6:]
@@ -66,18 +70,21 @@ def aside(climber: Climber, reach: float) -> Array:
 
     # Those that carry the least first
     for j, row in sorted(rows.items(), key=lambda entry: len(carried[entry[0]])) * ROUNDS:
-        pairs = [pair for pair in robot.self_pairs or () if len(carried[j].intersection(pair)) == 1]
-        limbs = [pair for pair in pairs if moving.intersection(pair)]
+        pairs = [pair for pair in robot.self_pairs or () if carried[j].intersection(pair)]
+        limbs = [pair for pair in pairs if len(moving.intersection(pair)) == len(carried[j].intersection(pair)) == 1]
         tried = np.clip(postures[0, row] + TURNED_BY, low[row], high[row])
         scene = placed(row, tried)
         short = np.array([np.maximum(0.0, 1.0 - scene.bounds(*pair) / (KEEPS_OFF * reach)) for pair in limbs])
         near = short.sum(axis=0).reshape(len(tried), SAMPLED).mean(axis=1)
-        cost = near + TURNED * len(carried[j]) * np.abs(tried - values[row])
-        for best in np.argsort(cost, kind="stable").tolist() if near[0] > 0.0 else ():
-            others = [pair for pair in pairs if pair not in limbs and scene.bounds(*pair)[best * SAMPLED] < KEPT]
-            apart = [[scene.distance(*pair, k * SAMPLED) for k in (0, best)] for pair in others]
-            if all(then >= min(now, KEPT) for now, then in apart):
-                postures[:, row] = tried[best]
-                break
+        others = [pair for pair in pairs if not moving.intersection(pair)]
+        firsts = [k * SAMPLED for k in range(len(tried))]
+        near_pairs = [pair for pair in others if scene.bounds(*pair)[firsts].min() < KEPT]
+        apart = [[scene.distance(*pair, k) for k in firsts] for pair in near_pairs]
+        kept = np.minimum(np.reshape(apart, (-1, len(tried))), KEPT)
+        lacks = (1.0 - kept / KEPT).sum(axis=0)
+        cost = near + lacks + TURNED * len(carried[j]) * np.abs(tried - values[row])
+        allowed = [k for k in np.argsort(cost, kind="stable").tolist() if (kept[:, k] >= kept[:, 0]).all()]
+        if near[0] + lacks[0] > 0.0:
+            postures[:, row] = tried[allowed[0]]
     values[list(rows.values())] = postures[0, list(rows.values())]
     return np.asarray(climber.with_values(climber.rest[None], values[None])[0])

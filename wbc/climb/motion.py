@@ -17,7 +17,6 @@ from wbc.climb.clear import TOLERANCE, Clearances, climber_bodies
 from wbc.climb.climber import Climber
 from wbc.climb.closure import Closure
 from wbc.climb.elastic_band import ElasticBand
-from wbc.climb.joint_values import beyond_limits
 from wbc.climb.move_path import MovePath, SwingShape, band_path, move_path
 from wbc.climb.path_loads import LEAST, PathLoads
 from wbc.climb.plan import ContactMove, ContactPlan
@@ -27,6 +26,7 @@ from wbc.climb.time_law import GRID, MotionSpeeds, PathTiming, TimedMove
 from wbc.climb.watch import PlanWatch
 from wbc.climb.world import ClimbWorld
 from wbc.errors import InfeasibleError, RangeError, ShapeError, WbcError
+from wbc.robot.joint_values import beyond_limits
 from wbc.validation import Array
 
 #: How far contacts of a stance may be from their footholds [m]

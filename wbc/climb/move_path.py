@@ -12,11 +12,11 @@ import numpy as np
 from wbc.climb.clear import stray_of
 from wbc.climb.closure import CLOSED, HEAVY_BODY, LIGHT_BODY, Closure
 from wbc.climb.elastic_band import BandRows, ElasticBand
-from wbc.climb.joint_values import beyond_limits, joint_values, with_joint_values
 from wbc.climb.stance import FREE_LIMB, Stance
 from wbc.climb.world import held_pose
 from wbc.errors import InfeasibleError
 from wbc.multibody import pin
+from wbc.robot.joint_values import beyond_limits, joint_values, with_joint_values
 from wbc.rotations import exponential, matrices
 from wbc.symbolic.joint_steps import place
 from wbc.validation import Array

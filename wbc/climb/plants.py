@@ -25,8 +25,10 @@ from wbc.validation import Array
 BALL = 0.002
 #: Thickness of a sole [m]
 SOLE_THICKNESS = 0.01
-#: Time constant of contacts, four time steps of 1 ms [s]
-CONTACT_TIME = 0.004
+#: Of a simulation [s]
+TIME_STEP = 0.001
+#: Time constant of contacts [s]
+CONTACT_TIME = 4.0 * TIME_STEP
 #: Ratio of the stiffness of friction to that of normal forces: feet creep less [1]
 FRICTION_STIFFNESS = 10.0
 #: Bit of what stands in the world, as of :func:`mujoco_spec`
@@ -60,10 +62,8 @@ class PlantErrors:
     rubbing: float = 0.0
 
     def __post_init__(self) -> None:
-        validation.scalar("PlantErrors.mass", self.mass, low=0.0, high=0.9)
-        for name in ("friction", "payload", "rubbing"):
-            validation.scalar(f"PlantErrors.{name}", getattr(self, name), low=0.0)
-        validation.scalar("PlantErrors.delay", self.delay, low=0.0, unit="s")
+        validation.own_scalars(self, "mass", low=0.0, high=0.9)
+        validation.own_scalars(self, "friction", "payload", "rubbing", "delay", low=0.0)
 
     def built(self, climber: Climber, gravity: Array) -> Robot:
         """The robot as it is, with the contact frames of its limbs.
@@ -95,8 +95,8 @@ def climb_plant(
     errors: PlantErrors | None = None,
     faults: Sequence[PlantFault] = (),
 ) -> ClimbPlant | RigidClimbPlant | None:
-    """The plant of a name: ``kinematic`` (None), ``pinocchio`` or ``mujoco``; ``LoopOptions(delay=plant.errors.delay)``
-    goes with it.
+    """The plant of a name: ``kinematic`` (None), ``pinocchio`` or ``mujoco``; ``ClimbLoop(plan, plant,
+    delay=plant.errors.delay)`` goes with it.
 
     Args:
         climber: what climbs. scene: what it climbs, its gravity too. errors, faults: of a plant of torques; a delay
@@ -123,7 +123,7 @@ class RigidClimbPlant(PinocchioPlant):
 
     Args:
         climber: what climbs, all of whose limbs grip. scene: its gravity counts. errors: None: none. faults: that come
-            in time. time_step: [s].
+            in time.
 
     Attributes:
         errors: as given.
@@ -134,15 +134,14 @@ class RigidClimbPlant(PinocchioPlant):
     """
 
     def __init__(
-        self, climber: Climber, scene: ClimbScene, errors: PlantErrors | None = None, faults: Sequence[PlantFault] = (),
-        time_step: float = 0.001,
-    ) -> None:  # fmt: skip
+        self, climber: Climber, scene: ClimbScene, errors: PlantErrors | None = None, faults: Sequence[PlantFault] = ()
+    ) -> None:
         for limb in climber.limbs:
             if not limb.contact.pulls:
                 raise RangeError("plant", limb.name, "feet need a plant with contacts, such as mujoco")
         self.errors, self._events = errors or PlantErrors(), FaultEvents(climber, faults)
         robot = self.errors.built(climber, scene.gravity)
-        super().__init__(robot, time_step, integrator="midpoint", motors=self.errors.motors, seed=self.errors.seed)
+        super().__init__(robot, TIME_STEP, integrator="midpoint", motors=self.errors.motors, seed=self.errors.seed)
 
     def reset(self, q: Array, time: float, v: Array | None = None) -> None:
         """As of :class:`PinocchioPlant`; no fault has come yet."""
@@ -172,7 +171,6 @@ class ClimbPlant(GrippingMujocoPlant):
 
     Args:
         climber: what climbs. scene: what it climbs, its gravity too. errors: None: none. faults: that come in time.
-        time_step: [s].
 
     Attributes:
         errors: as given.
@@ -183,9 +181,8 @@ class ClimbPlant(GrippingMujocoPlant):
     """
 
     def __init__(
-        self, climber: Climber, scene: ClimbScene, errors: PlantErrors | None = None, faults: Sequence[PlantFault] = (),
-        time_step: float = 0.001,
-    ) -> None:  # fmt: skip
+        self, climber: Climber, scene: ClimbScene, errors: PlantErrors | None = None, faults: Sequence[PlantFault] = ()
+    ) -> None:
         extras.require("mujoco", "a climb in MuJoCo")
         import mujoco
 
@@ -194,7 +191,7 @@ class ClimbPlant(GrippingMujocoPlant):
         robot = errors.built(climber, scene.gravity)
         feet = [limb for limb in climber.limbs if not limb.contact.pulls]
         shapes = {contact_frame(limb): [_foot(climber, limb)] for limb in feet}
-        spec = mujoco_spec(robot, time_step=time_step, contacts=shapes, drawn=False)
+        spec = mujoco_spec(robot, time_step=TIME_STEP, contacts=shapes, drawn=False)
         spec.option.cone, spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, FRICTION_STIFFNESS
         frictions = {f"{contact_frame(limb)} 0": getattr(limb.contact, "friction", 0.0) for limb in feet}
         for geom in spec.geoms:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,7 +15,7 @@ from wbc.clearance import CylinderInside, EndlessCylinder
 from wbc.climb.scene import ClimbScene
 from wbc.errors import RangeError, ShapeError
 from wbc.multibody import pin
-from wbc.track.path_file import PathFileError, csv_rows
+from wbc.track.path_file import csv_rows, rows_of
 from wbc.validation import Array
 
 #: Columns of a file that have to be there: time [s] and speeds along the body's axes [m/s]
@@ -72,20 +71,8 @@ def read_twists(path: str | Path) -> TwistTable:
             line is named.
     """
     file = Path(path)
-    validation.one_of("rates", file.suffix.lower(), (".csv", ".npz"))
-    try:
-        if file.suffix.lower() == ".npz":
-            rows = _from_npz(file)
-        else:
-            given = csv_rows(file, file.read_text(encoding="utf-8"), LINEAR, ANGULAR)
-            numbers = [validation.real_array(f"{file.name} {label}", row) for label, row in given]
-            rows = np.array(numbers)
-    except FileNotFoundError as error:
-        raise PathFileError("rates", str(file), validation.no_such(file)) from error
-    except (OSError, EOFError, ValueError, zipfile.BadZipFile) as error:
-        raise PathFileError("rates", str(file), f"cannot be read: {error}") from error
-    if not len(rows):
-        raise PathFileError("rates", str(file), "has no rates")
+    given = rows_of("rates", file, lambda text: csv_rows(file, text, LINEAR, ANGULAR), _from_npz)
+    rows = np.array([validation.real_array(f"{file.name} {label}", row) for label, row in given])
     twists = np.zeros((len(rows), 6))
     twists[:, : rows.shape[1] - 1] = rows[:, 1:]
     return TwistTable(rows[:, 0], twists)
@@ -144,7 +131,7 @@ def round_surface(scene: ClimbScene, pose: pin.SE3, twist: Array) -> Array:
     return np.concatenate([twist[:3], twist[3:] + pose.rotation.T @ turn])
 
 
-def _from_npz(file: Path) -> Array:
+def _from_npz(file: Path) -> list[tuple[str, Array]]:
     with np.load(file, allow_pickle=False) as data:
         names = [*LINEAR, *(ANGULAR if set(ANGULAR) & set(data.files) else ())]
         for name in names:
@@ -152,4 +139,4 @@ def _from_npz(file: Path) -> Array:
         arrays = [validation.real_array(name, data[name], finite=False) for name in names]
     for name, array in zip(names, arrays, strict=True):
         validation.real_array(name, array, (len(arrays[0]),))
-    return np.stack(arrays, axis=1)
+    return [(f"row {k}", row) for k, row in enumerate(np.stack(arrays, axis=1))]

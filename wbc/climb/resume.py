@@ -13,9 +13,9 @@ from wbc.climb.motion import MotionOptions
 from wbc.climb.plan import ContactPlan
 from wbc.climb.scene import ClimbScene
 from wbc.climb.stance import FREE_LIMB, Stance
-from wbc.climb.turn import BodyTurn, MovingStance
+from wbc.climb.turn import BodyTurn
 from wbc.climb.world import held_pose
-from wbc.errors import InfeasibleError, RangeError, ShapeError
+from wbc.errors import InfeasibleError, ShapeError
 from wbc.log import Log
 from wbc.multibody import pin
 from wbc.validation import Array
@@ -82,7 +82,7 @@ def coming_to_rest(
     stance, v = stance_in(log, climber, scene, at), log.array("v")[_row(log, climber, scene, at)]
     if float(np.abs(v).max()) <= STILL:
         return None
-    state, robot = MovingStance(stance.contacts, stance.q, v), climber.robot
+    robot = climber.robot
     able = robot.limits.acceleration[robot.base_nv :] > 0.0
     slowing = np.abs(v[robot.base_nv :][able]) / (SLOWING * robot.limits.acceleration[robot.base_nv :][able])
     coasts = max(COASTS, float(slowing.max(initial=0.0)))
@@ -91,7 +91,7 @@ def coming_to_rest(
         part = min(time, coasts)
         return np.asarray(pin.integrate(robot.model, stance.q, part * (1.0 - 0.5 * part / coasts) * v))
 
-    return BodyTurn(climber, scene, options or MotionOptions()).planned(state, np.zeros(6), falling, lasts=coasts)
+    return BodyTurn(climber, scene, options or MotionOptions()).planned(stance, v, np.zeros(6), falling, lasts=coasts)
 
 
 def _row(log: Log, climber: Climber, scene: ClimbScene, at: float | None) -> int:
@@ -102,7 +102,5 @@ def _row(log: Log, climber: Climber, scene: ClimbScene, at: float | None) -> int
             was = log.meta.get(field.removesuffix("_digest"))
             raise ShapeError("log", was, f"its {field.removesuffix('_digest')} is another one than was given")
     t = log["t"]
-    when = float(t[-1]) if at is None else validation.scalar("at", at, unit="s")
-    if not t[0] <= when <= t[-1]:
-        raise RangeError("at", when, f"the log is from {t[0]:g} to {t[-1]:g} s")
+    when = float(t[-1]) if at is None else validation.scalar("at", at, low=float(t[0]), high=float(t[-1]), unit="s")
     return int(np.searchsorted(t, when + 1e-9, side="right")) - 1

@@ -59,9 +59,7 @@ class Foothold:
         validation.name("Foothold.id", self.id)
         object.__setattr__(self, "pose", validation.pose("Foothold.pose", self.pose))
         validation.instance("Foothold.on", self.on, str, "the id of a body, or an empty text")
-        if self.friction != np.inf:
-            value = validation.scalar("Foothold.friction", self.friction, low=0.0, open_low=True)
-            object.__setattr__(self, "friction", value)
+        validation.own_scalars(self, "friction", low=0.0, open_low=True, infinite=True)
         object.__setattr__(self, "limbs", validation.strings("Foothold.limbs", self.limbs))
         object.__setattr__(self, "rolls", validation.integer("Foothold.rolls", self.rolls))
 

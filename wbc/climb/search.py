@@ -56,7 +56,7 @@ ATTEMPTS = 3
 #: What each of them costs more [steps]
 AGAIN = 16.0
 #: What a move costs more whose like could not be made, once [steps]
-LATE = 8.0
+LATE = 5.0
 #: Of the robot's length, and of directions: moves that differ by less are alike [1]
 ALIKE = 0.05
 #: What a limb in the air costs [steps]
@@ -271,8 +271,13 @@ class StanceSearch:
         self._delays = dict[tuple[int, bytes], float]()
         #: How often the like of a move was out of reach since one was not
         self._misses = Counter[tuple[Any, ...]]()
+        #: Limbs that could not be lifted from the like of a stance
+        self._stuck = dict[tuple[Any, ...], set[int]]()
         self._known_apart: dict[tuple[int, int], bytes] = {}
-        self._down = np.asarray(self.world.numbers.down)
+        #: Of each place where it is, in lengths of the robot, its axes, and which way is down
+        axes, down = self.world.places[:, :9].reshape(-1, 3, 3), np.asarray(self.world.numbers.down)
+        at = self.world.places[:, 9:, None] / self.world.length
+        self._columns = np.concatenate([at, axes, np.broadcast_to(down[:, None], at.shape)], axis=2)
         #: Stances that are come to by a forbidden move, and other moves to known stances
         self._removed: dict[int, _Node] = {}
         self._other: defaultdict[bytes, list[tuple[float, _Node, NDArray[np.int32]]]] = defaultdict(list)
@@ -372,16 +377,22 @@ class StanceSearch:
         return not self._late.isdisjoint(move for k in moved for move in (((), k, there[k]), (before, k, FREE_LIMB)))
 
     def _put_off(self, node: _Node, after: NDArray[np.int32]) -> float:
-        """What a move costs beyond what it was put off by so far: as one that is late, and for each time that its like
-        was out of reach since one was not [steps].
+        """What a move costs beyond what it was put off by so far: as one that is late, for each time that its like was
+        out of reach since one was not, and where nothing could be lifted from its like [steps].
         """
         key = id(node), after.tobytes()
-        due = LATE * (self._is_late(node, after) + self._misses[self._alike(node.contacts, after)])
+        misses = self._misses.get(self._alike(node.contacts, after), 0)
+        due = LATE * (self._is_late(node, after) + misses + self._leads_nowhere(node, after))
         more = due - self._delays.get(key, 0.0)
         if more <= 0.0:
             return 0.0
         self._delays[key] = due
         return more
+
+    def _leads_nowhere(self, node: _Node, after: NDArray[np.int32]) -> bool:
+        """Whether no limb that stays could be lifted next from a stance like that after a move."""
+        stuck = self._stuck.get(self._alike(after, after))
+        return stuck is not None and stuck.issuperset(np.flatnonzero((node.contacts == after) & (after >= 0)).tolist())
 
     def _alike(self, contacts: NDArray[np.int32], after: NDArray[np.int32]) -> tuple[Any, ...]:
         """What moves are told apart by in how far limbs reach: which limbs move, and where they and those that stay are
@@ -396,10 +407,9 @@ class StanceSearch:
         if min(first, other) < 0:
             return b""
         if (first, other) not in self._known_apart:
-            one, there = self.world.places[[first, other]]
-            turn = one[:9].reshape(3, 3).T
-            parts = turn @ (there[9:] - one[9:]) / self.world.length, turn @ there[:9].reshape(3, 3), turn @ self._down
-            numbers = np.concatenate([np.ravel(part) for part in parts]) / ALIKE
+            columns = self._columns[other].copy()
+            columns[:, 0] -= self._columns[first, :, 0]
+            numbers = self._columns[first, :, 1:4].T @ columns / ALIKE
             self._known_apart[first, other] = numbers.round().astype(np.int16).tobytes()
         return self._known_apart[first, other]
 
@@ -409,15 +419,20 @@ class StanceSearch:
         key, margin = kept.tobytes(), self.options.margin
         known = node.lifts.get(key)
         if known is None or (known[1] < attempt and known[0][0] != PostureOutcome.STANDS):
-            lifted = self.world.lift(node.contacts, kept, margin, node.state, attempt)
-            if lifted[0] == PostureOutcome.STANDS and not self._driven(kept, lifted[1]):
-                lifted = PostureOutcome.NOT_BORNE, *lifted[1:]
-            node.lifts[key] = lifted, attempt
+            # What lifts next depends on it: other beginnings cost less than other stances
+            for beginning in range(attempt, max(attempt + 1, ATTEMPTS)):
+                lifted = self.world.lift(node.contacts, kept, margin, node.state, beginning)
+                if lifted[0] == PostureOutcome.STANDS and self._driven(kept, lifted[1]):
+                    break
+                if lifted[0] == PostureOutcome.STANDS:
+                    lifted = PostureOutcome.NOT_BORNE, *lifted[1:]
+            node.lifts[key] = lifted, beginning
             self.tried[lifted[0]] += lifted[0] != PostureOutcome.STANDS
         how, lift, before, moves = node.lifts[key][0]
         if how != PostureOutcome.STANDS:
             moved = np.flatnonzero(node.contacts != after)
             node.stuck.update(moved.tolist() if len(moved) == 1 else [])
+            self._stuck.setdefault(self._alike(node.contacts, node.contacts), set()).update(node.stuck)
             return None
         node.stuck.difference_update(np.flatnonzero(node.contacts != after).tolist())
         how, land, slack = self.world.land(after, kept, margin, lift, attempt)
@@ -440,9 +455,9 @@ class StanceSearch:
 
     def _moves(self, node: _Node) -> _Moves:
         """Moves from a stance, with what they promise to cost, the least first; far ones come last."""
-        held = np.array([self._far[limb, at] if at >= 0 else np.nan for limb, at in enumerate(node.contacts)])
-        aloft = float(np.nanmean(held)) + IN_THE_AIR if np.isfinite(held).any() else IN_THE_AIR
-        each = np.where(np.isnan(held), aloft, held)
+        held = {limb: float(self._far[limb, at]) for limb, at in enumerate(node.contacts.tolist()) if at >= 0}
+        aloft = sum(held.values()) / max(len(held), 1) + IN_THE_AIR
+        each = np.array([held.get(limb, aloft) for limb in range(len(self._names))])
         done, total = node.steps + 1.0, float(each.sum())
         out, stretch = self.world.candidates(node.contacts, node.state, 0.0, NEAR)
         left = total - each[out[:, 0]] + self._far[out[:, 0], out[:, 1]]
@@ -568,6 +583,12 @@ class StanceSearch:
                 raise no_stances("start.q", float(angles[k]), reason, "start")
         if not numbers[0] >= 0.0:
             raise no_stances("start", float(numbers[0]), self._why_not_borne(first, numbers[0]), "start")
+        if self._balance is not None:
+            # By all of the efforts: the body may still shift to where a share of them is enough
+            held = self._rows(first.contacts)
+            if lacks := self._balance.lacking(held, world.q_of(first.state), max(self.options.effort, 1.0)):
+                reason = f"{self._balance.told(held, lacks)}, by all that its motors give"
+                raise no_stances("start", lacks[0][1], reason, "start")
         if numbers[1] < -SPARE - TOLERANCE:
             reason = f"{nearest} are {-numbers[1]:.3g} m nearer to each other than they may be"
             raise no_stances("start.q", float(numbers[1]), reason, "start")

@@ -23,7 +23,7 @@ from wbc.climb.contacts import GripHand, SuctionPad
 from wbc.climb.faults import PlantFault
 from wbc.climb.folder import PART, begin_folder, read_folder
 from wbc.climb.grids import GRID_ENDS, GRIDS, remove_columns, remove_fraction, remove_rows
-from wbc.climb.loop import ClimbLoop, ClimbRun, LoopOptions
+from wbc.climb.loop import ClimbLoop, ClimbRun
 from wbc.climb.places import body_frames, body_over, facing, surface_frames
 from wbc.climb.plan import ContactMove, ContactPlan
 from wbc.climb.plan_files import PLAN, save_plan
@@ -306,17 +306,15 @@ class ClimbSession:
             save_plan(first, folder / PLAN)
         tell("compiling", None)
         source, plant = self._source, self._plant
-        options = LoopOptions(delay=0.0 if plant is None else plant.errors.delay)
-        loop = ClimbLoop(first, plant, replan=source.replan, onward=source.onward, options=options, backend=backend)
+        delay = 0.0 if plant is None else plant.errors.delay
+        loop = ClimbLoop(first, plant, replan=source.replan, onward=source.onward, delay=delay, backend=backend)
         if self.hooks.compiled is not None:
             validation.called("compiled", self.hooks.compiled, loop.controller)
         if self.hooks.ask is not None:
             loop.approve = lambda move: self._approved(loop, move)
         self._lasts = float(first.times[-1]) if source.lasts is None else source.lasts
         begun = time.process_time()
-        with contextlib.ExitStack() as stack:
-            if folder is not None:
-                stack.enter_context(loop.recorded(folder / PART))
+        with contextlib.nullcontext() if folder is None else loop.recorded(folder / PART):
             run = loop.run(2.0 * self._lasts + MOST_AFTER, self._before_tick)
         looping = time.process_time() - begun
         if folder is not None:

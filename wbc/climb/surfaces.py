@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from wbc import validation
 from wbc.clearance import CylinderInside, EndlessCylinder, TriangleMesh
-from wbc.clearance.scene import Shape
+from wbc.clearance.scene import Shape, Unbounded, patch_of
 from wbc.climb.scene import Foothold
 from wbc.errors import RangeError, ShapeError
 from wbc.multibody import pin
 from wbc.shapes import Cylinder, HalfSpace, HeightMap, Solid
-from wbc.shapes.surfaces import between_rows
 from wbc.validation import Array
 
 #: Faces of a surface that meet at less are one curved surface [rad]
@@ -38,8 +37,7 @@ class FootholdRules:
     Attributes:
         spacing: between footholds of one face [m].
         edge: distance kept from where the surface ends and, unless a patch is asked for, faces meet sharply [m].
-        up: direction against which slopes are counted ``(3)``.
-        max_slope: largest angle between normal and ``up`` [rad].
+        max_slope: largest angle between normal and z of the world [rad].
         sole: radius of the patch that has to be even [m]; 0: not looked at.
         max_roughness: largest distance of the patch from the plane that fits it best [m].
         friction: of the footholds [1].
@@ -51,7 +49,6 @@ class FootholdRules:
 
     spacing: float = 0.1
     edge: float = 0.03
-    up: Any = (0.0, 0.0, 1.0)
     max_slope: float = pi
     sole: float = 0.0
     max_roughness: float = 0.01
@@ -59,15 +56,9 @@ class FootholdRules:
     extent: float = 2.0
 
     def __post_init__(self) -> None:
-        for name in ("spacing", "extent"):
-            value = validation.scalar(f"FootholdRules.{name}", getattr(self, name), low=0.0, open_low=True, unit="m")
-            object.__setattr__(self, name, value)
-        for name in ("edge", "sole", "max_roughness"):
-            value = validation.scalar(f"FootholdRules.{name}", getattr(self, name), low=0.0, unit="m")
-            object.__setattr__(self, name, value)
-        slope = validation.scalar("FootholdRules.max_slope", self.max_slope, low=0.0, high=pi, unit="rad")
-        object.__setattr__(self, "max_slope", slope)
-        object.__setattr__(self, "up", validation.unit_vector("FootholdRules.up", self.up))
+        validation.own_scalars(self, "spacing", "extent", low=0.0, open_low=True, unit="m")
+        validation.own_scalars(self, "edge", "sole", "max_roughness", low=0.0, unit="m")
+        validation.own_scalars(self, "max_slope", low=0.0, high=pi, unit="rad")
 
 
 def footholds_on(
@@ -92,7 +83,7 @@ def footholds_on(
     if not len(points):
         return ()
     points, normals = _on_round(shape, pose, points, faces.normals[faces.first[face]])
-    kept = normals @ given.up >= cos(given.max_slope) - 1e-9
+    kept = normals[:, 2] >= cos(given.max_slope) - 1e-9
     if given.edge > 0.0:
         kept &= faces.from_edges(points, given.sole == 0.0) >= given.edge - 1e-9
     points, normals = points[kept], normals[kept]
@@ -177,7 +168,7 @@ class _Faces:
         order = np.argsort(self.face, kind="stable")
         for face, rows in enumerate(np.split(order, np.cumsum(count)[:-1])):
             normal = self.normals[self.first[face]]
-            steep = normal @ rules.up < cos(rules.max_slope) - 1e-9 and rules.sole == 0.0
+            steep = normal[2] < cos(rules.max_slope) - 1e-9 and rules.sole == 0.0
             if small[face] or steep:
                 continue
             frame = frame_on(self.triangles[rows[0], 0], normal)
@@ -201,13 +192,9 @@ def _triangles(shape: Shape, extent: float) -> Array:
     """The surface, its corners counter-clockwise seen from outside."""
     if isinstance(shape, TriangleMesh):
         return shape.corners
-    if isinstance(shape, HalfSpace):
-        rows = extent * np.array([[[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]], [[-1.0, 1.0, 0.0], [1.0, 1.0, 0.0]]])
-        return between_rows(rows)[:, ::-1]
-    if isinstance(shape, (EndlessCylinder, CylinderInside)):
-        angles = np.append(np.linspace(0.0, 2 * pi, FACETS, endpoint=False), 0.0)
-        ring = np.column_stack([shape.radius * np.cos(angles), shape.radius * np.sin(angles), np.zeros(len(angles))])
-        sides = between_rows(np.stack([ring - [0.0, 0.0, extent], ring + [0.0, 0.0, extent]]))
+    if isinstance(shape, Unbounded):
+        low, high = ([-extent] * 2, [extent] * 2) if isinstance(shape, HalfSpace) else ([0, -extent], [2 * pi, extent])
+        sides = patch_of(shape, low, high, FACETS)
         return sides if isinstance(shape, CylinderInside) else sides[:, ::-1]
     if isinstance(shape, HeightMap):
         rows, columns = shape.heights.shape

@@ -13,12 +13,12 @@ from wbc.climb.balance import Equilibrium
 from wbc.climb.clear import Clearances
 from wbc.climb.climber import Climber
 from wbc.climb.closure import CLOSED, Closure
-from wbc.climb.joint_values import beyond_limits, joint_values
 from wbc.climb.motion import MotionOptions
 from wbc.climb.plan import ContactMove, ContactPlan
 from wbc.climb.scene import ClimbScene
-from wbc.climb.stance import FREE_LIMB
+from wbc.climb.stance import FREE_LIMB, Stance
 from wbc.multibody import pin
+from wbc.robot.joint_values import beyond_limits, joint_values
 from wbc.symbolic.joint_steps import place
 from wbc.validation import Array
 
@@ -32,20 +32,6 @@ MOST_PULL = 0.9
 
 #: The motion that limbs in the air had, q ``(nq)`` by time [s]
 Guide = Callable[[float], Array]
-
-
-@dataclass(frozen=True, eq=False)
-class MovingStance:
-    """A robot on its way.
-
-    Attributes:
-        contacts: for each limb the row of the foothold that it holds, or ``FREE_LIMB``. q, v: where it is ``(nq)``,
-            and how fast it goes ``(nv)``.
-    """
-
-    contacts: tuple[int, ...]
-    q: Array
-    v: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,12 +51,13 @@ class BodyTurn:
     options: MotionOptions
 
     def planned(
-        self, state: MovingStance, twist: Array, guide: Guide, moves: Sequence[ContactMove] = (), lasts: float = 0.0
+        self, start: Stance, v: Array, twist: Array, guide: Guide, moves: Sequence[ContactMove] = (), lasts: float = 0.0
     ) -> ContactPlan | None:
-        """From a state on; None: no such plan was proven.
+        """From a stance on; None: no such plan was proven.
 
         Args:
-            twist: w_1 in the axes of the body ``(6)`` [m/s, rad/s]. guide: from the state on; contacts of limbs in the
+            start: where it is. v: how fast it goes there ``(nv)`` [m/s, rad/s].
+            twist: w_1 in the axes of the body ``(6)`` [m/s, rad/s]. guide: from the stance on; contacts of limbs in the
                 air go through the same places. moves: of those that land, by its time. lasts: the others move so
                 long [s].
         """
@@ -78,19 +65,20 @@ class BodyTurn:
             pace = _Slower(over, slower)
             slow = [replace(move, land=pace.when(move.land)) for move in moves]
             ends = max([2.0 * over, pace.when(lasts), *(move.land for move in slow)])
-            plan = self._along(state, _twists(state.v[:6], share * twist, over, ends), guide, pace, slow)
+            plan = self._along(start, v, _twists(v[:6], share * twist, over, ends), guide, pace, slow)
             if plan is not None:
                 return plan
         return None
 
     def _along(
-        self, state: MovingStance, timed: tuple[Array, Array], guide: Guide, pace: _Slower, moves: list[ContactMove]
-    ) -> ContactPlan | None:
+        self, start: Stance, begins: Array, timed: tuple[Array, Array], guide: Guide, pace: _Slower,
+        moves: list[ContactMove],
+    ) -> ContactPlan | None:  # fmt: skip
         (times, twists), climber = timed, self.climber
         limbs, lands = range(len(climber.limbs)), {move.limb: move.land for move in moves}
-        aloft = [limb for limb in limbs if state.contacts[limb] == FREE_LIMB]
-        wanted = {limb: place(climber.contact_pose(state.q, limb))[None] for limb in limbs}
-        q, pose = [np.array(state.q)], climber.body_pose(state.q)
+        aloft = [limb for limb in limbs if start.contacts[limb] == FREE_LIMB]
+        wanted = {limb: place(climber.contact_pose(start.q, limb))[None] for limb in limbs}
+        q, pose = [np.array(start.q)], climber.body_pose(start.q)
         for k, time in enumerate(times[1:]):
             pose = pose * pin.exp6(pin.Motion(0.5 * (times[k + 1] - times[k]) * (twists[k] + twists[k + 1])))
             some = climber.with_body(q[-1], pose)
@@ -106,19 +94,19 @@ class BodyTurn:
             q.append(some[0])
         steps, path = np.diff(times)[:, None], np.array(q)
         values, still = joint_values(climber.robot, path), np.zeros(climber.robot.nv - 6)
-        curve = CubicSpline(times, values, bc_type=((1, state.v[6:]), (1, still)))
+        curve = CubicSpline(times, values, bc_type=((1, begins[6:]), (1, still)))
         v = np.hstack([twists, curve(times, 1)])
         v[-1, 6:] = still
-        if not (self._within(path, v, steps) and self._borne(state.contacts, path)):
+        if not (self._within(path, v, steps) and self._borne(start.contacts, path)):
             return None
-        rows = [[row] for row in state.contacts]
+        rows = [[row] for row in start.contacts]
         for limb in aloft:
-            near = np.linalg.norm(self.scene.positions - climber.contact_pose(state.q, limb).translation, axis=1)
+            near = np.linalg.norm(self.scene.positions - climber.contact_pose(start.q, limb).translation, axis=1)
             rows[limb] += [int(near.argmin()), *(k for move in moves if move.limb == limb
                                                  for k in (move.leaves, move.lands))]  # fmt: skip
         if self._clear.moving(rows, times, path, v) is not None:
             return None
-        return ContactPlan(climber, self.scene, state.contacts, list(moves), times, path, v)
+        return ContactPlan(climber, self.scene, start.contacts, list(moves), times, path, v)
 
     @cached_property
     def _closure(self) -> Closure:

@@ -21,7 +21,7 @@ from wbc.climb.reach import LIMIT_MARGIN
 from wbc.climb.scene import ClimbScene, SceneBody
 from wbc.climb.stance import FREE_LIMB, Stance
 from wbc.errors import RangeError
-from wbc.geometry.kernel import ShapeTable, checked
+from wbc.geometry.kernel import ShapeTable, checked, distances
 from wbc.multibody import pin
 from wbc.shapes import PlacedShape
 from wbc.symbolic.joint_steps import place
@@ -140,15 +140,15 @@ class ClimbWorld:
         on_body = [names.index(h.on) if h.on in names else -1 for h in scene.footholds]
         on = np.array(on_body, dtype=np.int32)[self.hold]
         self._cones, self.cone_of = self._shapes_of_cones(turns, friction)
-        pieces, links, shapes, poses, pairs = self._bodies(spare)
+        pieces, links, shapes, poses, pairs = self._bodies(spare, apart + spare)
         self.links, self.bodies = links, names
-        self._shape_table = ShapeTable(shapes)
+        self._shape_table = ShapeTable(shapes, _pieces_of(climber, margin).table)
         self._held: list[Any] = [on, pieces, poses, pairs]
         self.touch = self._at_rest()
         down = gravity / strength if strength > 0.0 else np.zeros(3)
         self.numbers = _ClimbStruct(
             limbs=len(climber.limbs), footholds=len(self.places), pieces=len(links), bodies=len(names),
-            pairs=len(pairs) // 2, weightless=int(strength == 0.0), mass=climber.mass, length=self.length,
+            pairs=len(pairs), weightless=int(strength == 0.0), mass=climber.mass, length=self.length,
             clear=clear + spare, apart=apart + spare, down=tuple(down), trunk=tuple(self.limbs.trunk),
             limb=ctypes.addressof(self.limbs.numbers),
             offset=self.offsets.ctypes.data, foothold=self.places.ctypes.data,
@@ -392,7 +392,7 @@ class ClimbWorld:
                 table[limb, turned] = FREE_LIMB
         return numbers, np.ascontiguousarray(table)
 
-    def _bodies(self, spare: float) -> tuple[Any, list[str], list[Any], Array, NDArray[np.int32]]:
+    def _bodies(self, spare: float, apart: float) -> tuple[Any, list[str], list[Any], Array, NDArray[np.int32]]:
         """Pieces of the robot with their links' names, all shapes, poses of the bodies, and pairs of pieces."""
         robot = _pieces_of(self.climber, self.margin)
         links, shapes = robot.links, list(robot.shapes)
@@ -402,7 +402,7 @@ class ClimbWorld:
         bodies = list(self.scene.bodies.values())
         shapes += [body.shape for body in bodies]
         poses = np.array([place(_centre(body)) for body in bodies]).reshape(-1, 12)
-        return pieces, links, shapes, poses, robot.pairs
+        return pieces, links, shapes, poses, robot.pairs[robot.apart <= apart].astype(np.int32)
 
     def _at_rest(self) -> Array:
         """Contact poses at rest in the body's frame ``(limbs, 12)``."""
@@ -416,14 +416,17 @@ class _Pieces(NamedTuple):
     """Shapes of a climber on its limbs.
 
     Attributes:
-        links: of each shape. shapes: all. pairs: of shapes that may touch, one after the other ``(2 n)``.
+        links: of each shape. shapes: all. table: of these. pairs: of shapes that may touch ``(n, 2)``.
+        apart: how far those pairs are apart that never move relative to each other, -inf: they do ``(n)`` [m].
         places: limb and its step (-1, -1: the body), how deep the tip of a limb may be in what it holds [m], None:
             it is no tip; the pose there, twelve numbers.
     """
 
     links: list[str]
     shapes: list[Any]
-    pairs: NDArray[np.int32]
+    table: ShapeTable
+    pairs: NDArray[np.intp]
+    apart: Array
     places: list[tuple[int, int, float | None, tuple[float, ...]]]
 
 
@@ -439,20 +442,26 @@ def _pieces_of(climber: Climber, margin: float) -> _Pieces:
         for joint, steps in zip(chain, limbs.steps_to[limb], strict=True)
     }
     depths = {tip.body.name: tip.sink + SINK for tips in sunk_tips(climber) for tip in tips}
-    found = _Pieces([], [], np.zeros(0, dtype=np.int32), [])
+    links, shapes, places = list[str](), list[Any](), list[tuple[int, int, float | None, tuple[float, ...]]]()
     rows: dict[str, list[int]] = {}
     for body in climber_bodies(climber):
         frame = frame_index(model, body.link)
         parent = int(model.frames[frame].parentJoint)
         on = next((int(j) for j in reversed(list(model.supports[parent])) if int(j) in last_step), 1)
         at = data.oMi[on].actInv(data.oMf[frame]) * _centre(body)
-        rows.setdefault(body.link, []).append(len(found.links))
-        found.places.append((*last_step.get(on, (-1, -1)), depths.get(body.name), tuple(place(at))))
-        found.links.append(body.link if body.link in climber.robot.shapes else body.name)
-        found.shapes.append(body.shape)
+        rows.setdefault(body.link, []).append(len(links))
+        places.append((*last_step.get(on, (-1, -1)), depths.get(body.name), tuple(place(at))))
+        links.append(body.link if body.link in climber.robot.shapes else body.name)
+        shapes.append(body.shape)
     chosen = climber.robot.self_pairs or ()
     pairs = [(a, b) for one, other in chosen for a in rows.get(one, ()) for b in rows.get(other, ())]
-    return found._replace(pairs=np.array(pairs, dtype=np.int32).ravel())
+    both = np.array(pairs, dtype=np.intp).reshape(-1, 2)
+    on_step = np.array([at[:2] for at in places]).reshape(-1, 2)
+    poses = np.array([at[3] for at in places]).reshape(-1, 12)
+    still = (on_step[both[:, 0]] == on_step[both[:, 1]]).all(axis=1)
+    table, apart = ShapeTable(shapes), np.full(len(both), -np.inf)
+    apart[still] = distances(table, poses, *both[still].T)[:, 0]
+    return _Pieces(links, shapes, table, both, apart, places)
 
 
 def held_pose(climber: Climber, scene: ClimbScene, limb: int, foothold: int, q: Array) -> pin.SE3:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from wbc.explain.past import PastTick, kept_rows, rows_of
+from wbc.explain.past import PastTick, rows_of
 from wbc.multibody import pin
 from wbc.stack.layout import Block
 from wbc.stack.tables import stops
@@ -112,15 +112,8 @@ class Alone:
         """Rows at a configuration; ``own``: with the equality rows of the mechanism only."""
         tick, past, nv = self._tick, self._past, self._past.layout.nv
         tick.q[:] = q
-        if past.layout.cascade:
-            qp = tick.qp()
-            J, desired = kept_rows(tick, self.block)
-        else:
-            J, desired = rows_of(past, tick, self.block)
-            qp = tick.qp()
-        e = tick.report[past.places["error"]][self.block.span]
-        # At gain 1 and with targets that stand still, desired is -e up to the sign of the row
-        J = np.where(desired * e > 0.0, -1.0, 1.0)[:, None] * J
+        qp = tick.qp()
+        J, e = rows_of(tick, self.block)[0], tick.report[past.places["error"]][self.block.span]
         low, high = qp.lower[past.layout.variables :], qp.upper[past.layout.variables :]
         equal = (low == high) & (self._own if own else True)
         A = (qp.A[equal] * past.layout.dof_scales(past.stack))[:, :nv]

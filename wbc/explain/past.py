@@ -143,45 +143,13 @@ class PastTick:
         return [b for b in self.layout.blocks.values() if b is not block and not isinstance(b.entry.item, Mechanism)]
 
     def task_rows(self, block: Block) -> tuple[Array, Array]:
-        """(J, w) of a task's rows that count, J v - w being what each misses; both up to the sign of a row."""
-        return rows_of(self, self.tick, block)
+        """(J, w) of a task's rows that count, J v - w being what each misses."""
+        self.tick.qp()
+        return rows_of(self.tick, block)
 
 
-def rows_of(past: PastTick, tick: CompiledTick, block: Block) -> tuple[Array, Array]:
-    """:meth:`PastTick.task_rows` from the buffers of any tick of the same code.
-
-    A row's part of the plain QP is H = J'J and g = -J'w, from which both come back.
-    """
-    if past.layout.cascade:
-        tick.qp()
-        return kept_rows(tick, block)
-    weight, before = tick.weight.copy(), float(tick.plain[0])
-    damping = past.stack.damping / past.layout.dof_scales(past.stack) ** 2
-    rows, desired = np.zeros((len(block.rows), past.layout.variables)), np.zeros(len(block.rows))
-    tick.plain[0] = 1.0
-    factor = tick.report[past.places["factor"]]
-    for k in range(len(block.rows)):
-        if weight[block.start + k] == 0.0:
-            continue
-        tick.weight[:] = 0.0
-        tick.weight[block.start + k] = 1.0
-        H, g = tick.quadratic()
-        share = float(factor[block.start + k])
-        if not share > 0.0:
-            continue
-        squares = (np.diagonal(H) - damping) / share
-        i = int(squares.argmax())
-        if squares[i] > 0.0:
-            square = np.concatenate([H[:i, i], H[i, i:]]) / share
-            square[i] = squares[i]
-            rows[k] = square / np.sqrt(squares[i])
-            desired[k] = -float(g[i]) / share / rows[k, i]
-    tick.weight[:], tick.plain[0] = weight, before
-    return rows, desired
-
-
-def kept_rows(tick: CompiledTick, block: Block) -> tuple[Array, Array]:
-    """:func:`rows_of` the last QP, where the tick keeps its rows."""
+def rows_of(tick: CompiledTick, block: Block) -> tuple[Array, Array]:
+    """:meth:`PastTick.task_rows` of the QP that any tick of the same code assembled last."""
     tasks, span = tick.task_rows(), block.span
     counts = (tick.weight[span] > 0.0) & (tasks.factor[span] > 0.0)
     return np.where(counts[:, None], tasks.J[span], 0.0), np.where(counts, tasks.desired[span], 0.0)

@@ -8,7 +8,7 @@ import numpy as np
 
 from wbc.explain.alone import MET, SINGULAR, Alone, NearestAnswer
 from wbc.explain.explanation import ExplainedBound, Loss
-from wbc.explain.past import PastTick, rows_of
+from wbc.explain.past import PastTick
 from wbc.explain.reason import Reason
 from wbc.stack.layout import Block
 from wbc.tasks.mechanism import Mechanism
@@ -47,11 +47,11 @@ class _ReasonFinder:
         self.q = past.tick.q.copy()
         self.here = self.alone.at(self.q)
         self.gain = float(past.tick.p[block.slots["gain"].span][0])
-        J, desired = rows_of(past, past.tick, block)
+        J, desired = past.task_rows(block)
         scales = past.layout.row_scales(past.stack)[block.span]
         chosen = self.alone.counts
         served = ((J @ v) / scales)[chosen]
-        #: rates that are asked for, and that the command gives, both up to the sign of a row
+        #: rates that are asked for, and that the command gives
         self.asked, self.served = (desired / scales)[chosen], served
         idle = ~np.abs(J[chosen]).max(axis=1, initial=0.0).astype(bool)
         self.asked[idle] = -self.gain * self.here.e[idle]

@@ -12,7 +12,7 @@ from wbc.explain.past import Frozen, PastTick
 from wbc.multibody import pin
 from wbc.qp.problem import QP, QPSolution
 from wbc.qp.relax import Relaxed
-from wbc.qp.sensitivity import Sensitivity
+from wbc.qp.sensitivity import Sensitivity, Squares, force_between
 from wbc.stack.layout import Block, Slot
 from wbc.validation import Array
 
@@ -28,8 +28,8 @@ def derivative(past: PastTick, name: str, value: str | None) -> Array:
         H dv + C_S' dlam = -(dH v + dg + dC_S' lam),      C_S dv = db_S - dC_S v
 
     for the rows S that hold v. What stands on the right are central differences of the QP's numbers, which are smooth
-    where the solution's change of rows is not. With strict levels they are differences of the levels
-    themselves, solved for the rows that push and the ranks of the tick.
+    where the solution's change of rows is not, those of H and g by :func:`~wbc.qp.sensitivity.force_between`. With
+    strict levels they are differences of the levels, solved for the rows that push and the ranks of the tick.
 
     Raises:
         UnknownNameError: no such item or value. SolverError: rows gave way, no optimum, or a rank that changes here.
@@ -50,11 +50,12 @@ def _of_one(past: PastTick, answer: Relaxed, moves: Moves, count: int) -> Array:
     n, size = wide.n, wide.lower.size
     sensitivity = Sensitivity(wide, QPSolution(answer.x, answer.multipliers, "solved"))
     upper = np.where(answer.multipliers > 0.0, 1.0, 0.0)
-    force, offset = np.zeros((n, count)), np.zeros((size, count))
+    force, offset, middle = np.zeros((n, count)), np.zeros((size, count)), _squares(past, wide)
     for k in range(count):
-        ends = [_moved(past, moves, k, by) for by in (_STEP, -_STEP)]
-        H, g, A = (_slope(ends, part) for part in ("H", "g", "A"))
-        force[:, k] = H @ answer.x + g + A.T @ answer.multipliers[n:]
+        found = [_moved(past, moves, k, by) for by in (_STEP, -_STEP)]
+        ends, (up, down) = [qp for qp, _ in found], (squares for _, squares in found)
+        A = _slope(ends, "A")
+        force[:, k] = force_between(up, middle, down, answer.x) / (2.0 * _STEP) + A.T @ answer.multipliers[n:]
         with np.errstate(invalid="ignore"):
             ends_moved = np.where(upper > 0.0, _slope(ends, "upper"), _slope(ends, "lower"))
         offset[:, k] = np.nan_to_num(ends_moved) - np.concatenate((np.zeros(n), A @ answer.x))
@@ -77,13 +78,22 @@ def _of_levels(past: PastTick, frozen: Frozen, moves: Moves, count: int) -> Arra
     return out
 
 
-def _moved(past: PastTick, moves: Moves, k: int, by: float) -> QP:
-    """The QP of displaced inputs."""
+def _moved(past: PastTick, moves: Moves, k: int, by: float) -> tuple[QP, Squares]:
+    """The QP of displaced inputs, and what it is made of."""
     state = past.tick.state.copy()
     moves(k, by)
     qp = past.tick.qp().with_slacks()
+    squares = _squares(past, qp)
     past.tick.state[:] = state
-    return qp
+    return qp, squares
+
+
+def _squares(past: PastTick, qp: QP) -> Squares:
+    """What the QP of the buffers, assembled last, is made of; slacks have no rows."""
+    rows, first = past.tick.task_rows(), slice(past.layout.leading)
+    J = np.zeros((past.layout.leading, qp.n))
+    J[:, : past.layout.variables] = rows.J[first]
+    return Squares(qp.H, qp.g, J, (past.tick.weight * rows.factor)[first], rows.desired[first])
 
 
 def _slope(ends: list[QP], part: str) -> Array:

@@ -89,7 +89,7 @@ def _check(place: pathlib.Path, overwrite: bool) -> None:
     if present is None:
         raise ExportError("folder", str(place), "is a file")
     if present and not overwrite:
-        raise ExportError("folder", str(place), "is not empty; say overwrite to replace an export")
+        raise ExportError("folder", str(place), "is not empty; overwrite (--force) replaces an export")
     if present and not {"wbc_tick.h", "values.h"} <= present:
         raise ExportError("folder", str(place), "holds something else than an export, which is not overwritten")
 

@@ -17,6 +17,7 @@ from wbc.api import Controller
 from wbc.formats.errors import FormatError
 from wbc.formats.run import RATE, Piece, Run, Wait
 from wbc.formats.writers import serve, write_csv, write_lerobot, write_mcap, write_npz, write_rerun
+from wbc.log.file import NOT_CLOSED
 from wbc.record.recorder import Recorder
 
 #: Time between two looks at a file that is still written [s]
@@ -64,7 +65,7 @@ def convert(
     meanwhile = to == "foxglove" or wait is not None
     with (validation.writing if meanwhile else validation.replacing)("out", place, FormatError) as fresh:
         write(source, pieces, fresh or place)
-    return place, source.remarks
+    return place, [*source.remarks, *([] if source.complete else [f"the run {NOT_CLOSED}"])]
 
 
 def _writer_of(to: str) -> Callable[[Run, Iterable[Piece], pathlib.Path], None]:

@@ -78,17 +78,23 @@ class Run:
         self._controller: Controller | None = None
         self._placed, self._said, self._said_at = dict[str, tuple[str, str]](), tuple[str, ...](), -np.inf
         self._chunks: Callable[[Wait | None], Iterable[tuple[Log, Array]]]
+        self._ticks: LogFile | None = None
         if file.suffix == ".parquet" or not is_recording(file):
             log = load(file)
             self.about, self.units, self._chunks = log.meta, log.units, lambda wait: [(log, log["t"])]
         elif "kinds" in (ticks := LogFile(file)).about:
-            self.about, self.units = ticks.about["meta"], ticks.about["units"]
+            self._ticks, self.about, self.units = ticks, ticks.about["meta"], ticks.about["units"]
             self._chunks = lambda wait: ((log_of(ticks, rows), rows) for rows in ticks.chunks(wait))
         else:
-            recording = Recording(file)
+            self._ticks = recording = Recording(file)
             self.about, self.units, self._chunks = recording.about, recording.column_units, recording.logs
             self._read_stack(recording, trust)
         self._robot = self._own_robot() if self._controller is None else self._controller.stack.robot
+
+    @property
+    def complete(self) -> bool:
+        """It was closed: see :attr:`wbc.log.LogFile.complete`."""
+        return self._ticks is None or self._ticks.complete
 
     @cached_property
     def bodies(self) -> Mapping[str, DrawnMesh]:

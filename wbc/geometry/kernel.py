@@ -73,18 +73,22 @@ def checked(found: ctypes.PyDLL, **sizes: type[ctypes.Structure]) -> ctypes.PyDL
 class ShapeTable:
     """Shapes as the kernel reads them; their numbers live as long as this.
 
+    Args:
+        begun: a table that has some of them already, whose numbers are taken over.
+
     Attributes:
         address: of the first one.
     """
 
-    def __init__(self, shapes: Sequence[Geometry]) -> None:
-        self._rows, self._kept = (ShapeNumbers * max(1, len(shapes)))(), list[object]()
-        known: dict[int, ShapeNumbers] = {}
+    def __init__(self, shapes: Sequence[Geometry], begun: ShapeTable | None = None) -> None:
+        self._rows, self._kept = (ShapeNumbers * max(1, len(shapes)))(), list[object]([begun])
+        self._known: dict[int, ShapeNumbers] = {} if begun is None else dict(begun._known)
         for k, shape in enumerate(shapes):
             # The same mesh in many places is stored once
-            if id(shape) not in known:
-                known[id(shape)] = self._numbers(shape)
-            self._rows[k] = known[id(shape)]
+            if id(shape) not in self._known:
+                self._known[id(shape)] = self._numbers(shape)
+                self._kept.append(shape)
+            self._rows[k] = self._known[id(shape)]
         self.address = ctypes.addressof(self._rows)
 
     def _numbers(self, shape: Geometry) -> ShapeNumbers:

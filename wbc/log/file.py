@@ -49,6 +49,10 @@ class LogFileError(WbcError):
     """A log that is missing, or cannot be written or read."""
 
 
+#: What is said of a file that is not complete
+NOT_CLOSED = "was not closed; its last ticks may be missing"
+
+
 class LogWriter(Protocol):
     """Where a recorder writes. :class:`FileWriter` is the one of files; what takes logs elsewhere, as another format or
     a stream over a network, has these methods. Those after ``begin`` may raise ``OSError``: the run goes on without it.

@@ -10,12 +10,66 @@ together the minimiser has a kink, and other directions have another derivative.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from wbc.errors import SolverError
 from wbc.qp.factor import ActiveRows, Factor, active_bounds
 from wbc.qp.problem import QP, QPSolution
 from wbc.validation import Array
+
+#: What rounding leaves of a difference, times what it was made of
+_NOISE = 32.0 * float(np.finfo(float).eps)
+
+
+@dataclass(frozen=True, eq=False)
+class Squares:
+    """H and g of one QP or of several, made of rows: H = J'WJ + rest, g = -J'W d + rest.
+
+    Attributes:
+        H: [..., n, n]. g: [..., n]. J: [..., m, n]. weight, desired: diagonal of W, and d [..., m].
+    """
+
+    H: Array
+    g: Array
+    J: Array
+    weight: Array
+    desired: Array
+
+    def missed(self, x: Array) -> Array:
+        """W (J x - d) [..., m]."""
+        return np.asarray(self.weight * (_along(self.J, x) - self.desired))
+
+    def rest(self, x: Array) -> tuple[Array, Array]:
+        """(what H x + g has beside J'W (J x - d), the size of what it is the difference of) [..., n]."""
+        whole, size = np.abs(self.J), np.abs(self.g) + _along(np.abs(self.H), np.abs(x))
+        rows = self.weight * (_along(whole, np.abs(x)) + np.abs(self.desired))
+        rest = _along(self.H, x) + self.g - _across(self.J, self.missed(x))
+        return rest, size + _across(whole, rows)
+
+
+def force_between(up: Squares, middle: Squares, down: Squares, x: Array) -> Array:
+    """Difference of H x + g between two QPs about a third [..., n], by the rows that H and g are made of:
+
+        (J_+ - J_-)' W (J x - d) + J' (W (J x - d)_+ - W (J x - d)_-) + that of the rest
+
+    The second term is in the range of J' whatever step lies between: along directions that no row has, where H is next
+    to nothing, differences of H and g themselves are noise and terms of the step's third order.
+    """
+    (above, large), (below, small) = up.rest(x), down.rest(x)
+    rest = above - below
+    rest = np.where(np.abs(rest) > _NOISE * np.maximum(large, small), rest, 0.0)
+    turned = _across(up.J - down.J, middle.missed(x))
+    return np.asarray(turned + _across(middle.J, up.missed(x) - down.missed(x)) + rest)
+
+
+def _along(rows: Array, x: Array) -> Array:
+    return np.asarray((rows @ x[..., None])[..., 0])
+
+
+def _across(rows: Array, force: Array) -> Array:
+    return np.asarray((force[..., None, :] @ rows)[..., 0, :])
 
 
 class Sensitivity:

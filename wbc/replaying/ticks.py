@@ -243,7 +243,10 @@ def redoing(recording: Recording, controller: Controller) -> Callable[[Array, bo
 
 def _own_stack(recording: Recording, trust: bool) -> Stack:
     if recording.stack_pickle is None:
-        reason = f"holds no stack, which could not be pickled ({recording.about['not_pickled']}): give it"
+        problem = recording.about["not_pickled"]
+        reason = (
+            f"holds no stack, which could not be pickled ({problem}): give it" if problem else "ends before its stack"
+        )
         raise RecordingError("recording", str(recording.path), reason)
     stack = load_stack(recording.stack_pickle, trust=trust)
     if not isinstance(stack, Stack):

@@ -45,10 +45,9 @@ class BodyPlan:
     """Limbs, trunk and head of a skeleton.
 
     Attributes:
-        tree: the skeleton. limbs: name of :data:`LIMBS` -> points from the first below the trunk to the end.
+        limbs: name of :data:`LIMBS` -> points from the first below the trunk to the end.
         pelvis, chest: points that carry legs and arms; equal where one rigid body carries both.
-        head: points of the chain without a partner beyond the arms, or ().
-        axes: forward, left and up of the rest pose, as columns [3, 3].
+        head: points of the chain without a partner beyond the arms, or (). axes: forward, left and up at rest, columns.
         upright: whether the trunk stands on its legs; False: it lies on four.
     """
 
@@ -74,15 +73,12 @@ class _LimbPair:
 def find_body(
     tree: Skeleton, *, field: str = "skeleton", arms: bool = False, straight: float = 1.0, up: Array | None = None
 ) -> BodyPlan:
-    """The plan of a skeleton.
+    """The plan of a skeleton; :class:`BodyError` without a pair of limbs.
 
     Args:
         field: what a refusal names. arms: a single pair of limbs is arms, not legs.
         straight: cosine of the angle within which the line from right to left is taken for a coordinate axis.
         up: the direction that is up unless limbs say another; None: limbs alone say it.
-
-    Raises:
-        BodyError: no pair of limbs.
     """
     every = _pairs(tree)
     if not every:
@@ -117,9 +113,7 @@ def longest_chain(tree: Skeleton, first: int) -> tuple[int, ...]:
 
 
 def _lowest_branch(tree: Skeleton, chain: tuple[int, ...], up: Array) -> tuple[int, ...]:
-    """The branch of a leg that ends lowest, where that is well below the longest branch's end; else the longest. Of
-    branches that end at one place, as those of a closed loop do, the shortest carries the leg.
-    """
+    """The branch of a leg that ends well below the longest one, else that; of several to one place the shortest."""
     ends = {k for k in range(len(tree.names)) if chain[0] in ancestors(tree.parents, k)} - {*tree.parents}
     end = min(ends, key=lambda point: (float(tree.rest[point] @ up), point))
     if float((tree.rest[chain[-1]] - tree.rest[end]) @ up) <= LOWER * tree.length(chain):
@@ -162,9 +156,7 @@ def _unlike(tree: Skeleton, a: tuple[int, ...], b: tuple[int, ...]) -> tuple[flo
 
 
 def _up(tree: Skeleton, pairs: Sequence[_LimbPair], likely: Array) -> Array:
-    """The coordinate axis that is nearest to the direction from the limbs' ends to their beginnings, of which the
-    likely one counts as a limb: arms may point ahead.
-    """
+    """The coordinate axis nearest to the way up along the limbs, the likely one among them: arms may point ahead."""
     chains = np.array([(chain[0], chain[-1]) for pair in pairs for chain in pair.chains])
     rise = (tree.rest[chains[:, 0]] - tree.rest[chains[:, 1]]).sum(axis=0)
     rise += likely * max(pair.reach for pair in pairs)

@@ -152,10 +152,7 @@ def correspondence(body: RobotBody, skeleton: Skeleton, *, all_fours: bool = Fal
     """Find which points of a skeleton lead which links of a robot.
 
     Legs lead legs and arms lead arms. A robot on four legs that a person leads follows the feet in diagonal pairs, or
-    with ``all_fours`` hands and feet.
-
-    Raises:
-        CorrespondenceError: no limbs in the skeleton, or none that the robot needs: a robot that walks needs legs.
+    with ``all_fours`` hands and feet. :class:`CorrespondenceError` where the skeleton lacks limbs that the robot needs.
     """
     robot, some = body.robot, ", ".join(skeleton.names[:8])
     if body.is_hand:

@@ -22,14 +22,9 @@ KNUCKLE = 0.05
 def find_hand(tree: Skeleton, side: int = 0) -> BodyPlan:
     """The palm, and knuckles and tip of each finger, at most four points, in the order of :data:`FINGERS`.
 
-    The plan's axes are out of the back of a right hand, from its last finger to the index, and from fingers to wrist;
-    of a left one the first is out of the palm.
-
-    Args:
-        side: of several hands the one whose names say it, 1: left, -1: right.
-
-    Raises:
-        BodyError: no point carries a thumb and two fingers.
+    The plan's axes are out of the back of a right hand, or the palm of a left one, from its last finger to the index,
+    and from fingers to wrist. Of several hands it is the one whose names say the side, 1: left, -1: right;
+    :class:`BodyError` where no point carries a thumb and two fingers.
     """
     chains = [[_knuckles(tree, longest_chain(tree, child)) for child in own] for own in tree.children]
     hands = [[chain for chain in own if len(chain) > 2] for own in chains]
@@ -62,11 +57,7 @@ def find_hand(tree: Skeleton, side: int = 0) -> BodyPlan:
 
 
 def handedness(plan: BodyPlan, points: Array) -> float:
-    """1 of a right hand, -1 of a left one, by where its fingers are bent to; 0 where they are straight.
-
-    Args:
-        points: of the plan's tree [points, 3] [m].
-    """
+    """1 of a right hand, -1 of a left one, by where its fingers are bent to at points [points, 3]; 0: not at all."""
     bones = [np.diff(points[list(chain[:3])], axis=0) for name, chain in plan.limbs.items() if name != "thumb"]
     return float(np.sign(sum(np.cross(first, second) @ plan.axes[:, 1] for first, second in bones)))
 

@@ -2,51 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from wbc import validation
 from wbc.errors import ShapeError
-from wbc.retarget.clip import Array, Skeleton
+from wbc.retarget.clip import Array
 from wbc.retarget.correspondence import Correspondence
 from wbc.retarget.engine import Engine
-from wbc.retarget.mapping import LimbPlaces, Mapper, Places
-from wbc.retarget.plan import (
-    BEFORE,
-    BLEND,
-    LimbPlan,
-    MotionPlan,
-    in_the_air,
-    logarithms,
-    lowered,
-    lowering,
-    minimum_jerk,
-    raised,
-    standing_place,
-    with_ankles,
-)
+from wbc.retarget.mapping import Mapper
+from wbc.retarget.plan import BEFORE, BLEND, Planner, logarithms, minimum_jerk, toward
 from wbc.retarget.stances import FAST, HAND_HEIGHT, LEVEL, SLOW
+from wbc.retarget.targets import Targets
 from wbc.rotations import exponential
 
 #: Time constant of the filter of speeds [s]
 FILTER = 0.04
 #: How fast the pelvis may rise again when standing legs no longer ask for it to be low [m/s]
 RISE = 0.3
-
-
-@dataclass
-class _LiveLimb:
-    """What is known of a limb from frame to frame: ends [m], filtered speed [m/s], its contact and its target."""
-
-    ends: Array
-    speed: float = 0.0
-    slow: bool = False
-    stands: bool = False
-    share: float = 1.0
-    place: Array = field(default_factory=lambda: np.zeros(3))
-    heading: Array | None = None
 
 
 class LiveRetargeter:
@@ -61,20 +35,31 @@ class LiveRetargeter:
         rate: frames a second [Hz]. q: the last configuration; None before the first frame.
     """
 
-    def __init__(self, match: Correspondence, engine: Engine, skeleton: Skeleton, rate: float, every: int) -> None:
+    def __init__(self, match: Correspondence, engine: Engine, rate: float, every: int) -> None:
         self.rate = rate
         self._match, self._engine, self._every = match, engine, every
-        self._joints = len(skeleton.names)
-        self._mapper = Mapper(match)
-        rest = match.skeleton.rest
-        legs = [m for m in match.limbs.values() if m.source.endswith("leg")] or list(match.limbs.values())
-        self._leg = float(np.mean([np.linalg.norm(rest[m.base] - rest[m.end]) for m in legs]))
+        self._joints, rest = len(match.skeleton.names), match.skeleton.rest
+        self._mapper = Mapper(match, rate)
+        limbs = self._mapper.limbs
+        self._planner = Planner(match.body, limbs)
+        leads = [match.limbs[name] for name in limbs]
+        self._sources, self._ends = [one.source for one in leads], np.array([(one.end, one.tip) for one in leads])
+        self._of_legs = np.array([source.endswith("leg") for source in self._sources])
+        self._hands = np.array([not match.body.is_foot(name) for name in limbs])
+        self._radii = np.array([match.body.limbs[name].radius for name in limbs])
+        legs = [one for one in leads if one.source.endswith("leg")] or leads
+        self._leg = float(np.mean([np.linalg.norm(rest[one.base] - rest[one.end]) for one in legs]))
         self.reset()
 
     def reset(self) -> None:
         """Forget all frames: the next one is the first."""
-        self._limbs: dict[str, _LiveLimb] = {}
-        self._ankle: dict[str, float] = {}
+        count = len(self._sources)
+        #: of limbs: ends [m], filtered speeds [m/s], and their heights where they were lowest [m]
+        self._before, self._speeds, self._lowest = np.zeros((count, 2, 3)), np.zeros(count), np.full(count, np.inf)
+        self._slow, self._stands = np.zeros((2, count), dtype=bool)
+        #: share of the skeleton's path in an end's target, place and heading where it stands
+        self._shares, self._places = np.ones(count), np.zeros((count, 3))
+        self._headings: list[Array | None] = [None] * count
         self._last: tuple[Array, Array] | None = None
         self._with_turns = False
         self._low = 0.0
@@ -94,10 +79,16 @@ class LiveRetargeter:
         if self._last is not None and (turns is not None) != self._with_turns:
             raise ShapeError("turns", turns, "give turns in every frame or in none")
         self._with_turns = turns is not None
-        self._look(given)
-        places = self._mapper.places(given[None], None if rotations is None else rotations[None], self._ankle)
-        plan = self._plan(places)
-        now, held = self._engine.targets(plan), {name: limb.grip(0) for name, limb in plan.limbs.items()}
+        self._look(given[self._ends])
+        ankle = dict(zip(self._sources, self._lowest.tolist(), strict=True))
+        targets = self._mapper.targets(given[None], None if rotations is None else rotations[None], ankle)
+        self._planner.turn_ankles(targets)
+        if self._match.body.robot.base != "fixed":
+            for limb in range(len(self._sources)):
+                self._stand(targets, limb)
+            self._low = max(float(self._planner.lowering(targets)[0]), self._low - RISE / self.rate)
+            self._planner.lower(targets, np.array([self._low]))
+        now, held = self._engine.table(targets), targets.grips(0)
         if self._last is None or self.q is None:
             self.q = self._engine.start(*now, held)
         else:
@@ -105,58 +96,33 @@ class LiveRetargeter:
         self._last = now
         return self.q.copy()
 
-    def _look(self, points: Array) -> None:
-        """Which limbs stand, as far as the frames so far say."""
-        share = 1.0 - np.exp(-1.0 / (FILTER * self.rate))
-        lowest = np.inf
-        for name, match in self._match.limbs.items():
-            ends = points[[match.end, match.tip]]
-            limb = self._limbs.setdefault(name, _LiveLimb(ends))
-            speed = float(((ends - limb.ends) ** 2).sum(axis=1).max()) ** 0.5 * self.rate
-            limb.speed += share * (speed - limb.speed)
-            limb.ends = ends
-            limb.slow = limb.speed < (FAST if limb.slow else SLOW) * self._leg
-            self._ankle[match.source] = min(self._ankle.get(match.source, np.inf), float(ends[0, 2]))
-            if match.source.endswith("leg"):
-                lowest = min(lowest, float(ends[:, 2].min()))
-        for name, match in self._match.limbs.items():
-            limb = self._limbs[name]
-            near = LEVEL if match.source.endswith("leg") else HAND_HEIGHT
-            limb.stands = limb.slow and float(limb.ends[:, 2].min()) < lowest + near * self._leg
+    def _look(self, ends: Array) -> None:
+        """Which limbs stand, as far as the frames so far say, of their ends and tips [limbs, 2, 3] [m]."""
+        if self._last is not None:
+            speeds = np.sqrt(((ends - self._before) ** 2).sum(axis=2).max(axis=1)) * self.rate
+            self._speeds += (1.0 - np.exp(-1.0 / (FILTER * self.rate))) * (speeds - self._speeds)
+        self._before, low = ends, ends[:, :, 2].min(axis=1)
+        self._slow = self._speeds < np.where(self._slow, FAST, SLOW) * self._leg
+        self._lowest = np.minimum(self._lowest, ends[:, 0, 2])
+        near = low[self._of_legs].min(initial=np.inf) + np.where(self._of_legs, LEVEL, HAND_HEIGHT) * self._leg
+        self._stands = self._slow & (low < near)
 
-    def _plan(self, places: Places) -> MotionPlan:
-        """Targets of this frame, as a plan of one tick."""
-        body = self._match.body
-        eased = with_ankles(body, places.limbs, places.turn)
-        limbs = {name: self._limb(name, limb, places.turn) for name, limb in eased.items()}
-        plan = MotionPlan(places.pelvis, places.turn, places.chest, places.head, limbs, self._engine.dt)
-        self._low = max(float(lowering(body, plan)[0]), self._low - RISE / self.rate)
-        return lowered(body, plan, np.array([self._low]))
-
-    def _limb(self, name: str, limb: LimbPlaces, turn: Array) -> LimbPlan:
+    def _stand(self, targets: Targets, limb: int) -> None:
         """A limb's target of this frame: on its way to the place where it stands, there, or on its way from it."""
-        robot, state = self._match.body.limbs[name], self._limbs[name]
-        if self._match.body.robot.base == "fixed":
-            return in_the_air(limb)
-        stands = state.stands
-        if stands and state.share >= 1.0:
-            state.place, state.heading = standing_place(robot, limb, turn, 0, 1)
+        stands, share = bool(self._stands[limb]), float(self._shares[limb])
+        if stands and share >= 1.0:
+            self._places[limb], self._headings[limb] = self._planner.standing_place(targets, limb, slice(0, 1))
         step = 1.0 / (BLEND * self.rate)
-        state.share = max(state.share - step, 0.0) if stands else min(state.share + step, 1.0)
-        flat = limb.rotation is not None and robot.contact == "flat"
-        heading = state.heading if flat else None
-        if state.share <= 0.0:
-            end, rotation = state.place[None], limb.rotation if heading is None else heading[None]
-        else:
-            end, rotation = raised(robot, limb)
-            share = float(minimum_jerk(np.array(state.share)))
-            if share < 1.0:
-                end = state.place + share * (end - state.place)
-            if rotation is not None and heading is not None and share < 1.0:
-                rotation = heading @ exponential(share * logarithms(heading.T @ rotation))
-        held = np.array([stands and state.share * BLEND <= BEFORE])
-        lies = np.array([not self._match.body.is_foot(name) and bool(state.place[2] <= robot.radius)])
-        return LimbPlan(limb.base, limb.middle, limb.wrist, end, rotation, held, held, lies)
+        self._shares[limb] = share = max(share - step, 0.0) if stands else min(share + step, 1.0)
+        end, rotation = self._planner.raised(targets, limb)
+        if share < 1.0:
+            path = minimum_jerk(np.array([share]))
+            end, rotation = toward(self._places[limb], self._headings[limb], end, rotation, path)
+        targets.chains[:, limb, 3] = end
+        if rotation is not None:
+            targets.turns[self._mapper.limbs[limb]] = rotation
+        targets.held[0, limb] = targets.stands[0, limb] = stands and share * BLEND <= BEFORE
+        targets.lies[0, limb] = self._hands[limb] and self._places[limb, 2] <= self._radii[limb]
 
 
 def _between(last: tuple[Array, Array], now: tuple[Array, Array], every: int) -> tuple[Array, Array]:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
 from wbc.retarget.body import SHORT
 from wbc.retarget.clip import Array
 from wbc.retarget.correspondence import Correspondence, LimbMatch
+from wbc.retarget.targets import Targets
 
 #: From the trunk of a person on all fours, whose rest stands upright, to one that lies
 LYING_TRUNK = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
@@ -18,48 +17,12 @@ LYING_TRUNK = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
 CLEAR = 0.006
 #: What is higher than so many times this is not raised [1]
 FAR_ABOVE = 20.0
+#: Height of the ground for what may be below it [m]
+NO_GROUND = -1e9
 #: A bone that stands upright falls ahead where it cannot reach below the ground: share of its length [1]
 AHEAD_SHARE = 0.05
 #: Of a body whose front is steeper than the angle of this sine its back says where it heads
 STEEP = 0.9
-
-
-@dataclass(frozen=True)
-class LimbPlaces:
-    """Targets of a limb.
-
-    Attributes:
-        base, middle, wrist, end: positions of hip, knee, ankle and contact frame, or shoulder, elbow, wrist and hand
-            [frames, 3] [m].
-        rotation: of the foot's or hand's frame [frames, 3, 3]; None where the skeleton does not say it.
-    """
-
-    base: Array
-    middle: Array
-    wrist: Array
-    end: Array
-    rotation: Array | None
-
-
-@dataclass(frozen=True)
-class Places:
-    """Targets of a body, in the world of the robot: metres of the robot, the ground at z = 0.
-
-    Attributes:
-        pelvis: position of the middle of the hips [frames, 3] [m]. turn: of pelvis [frames, 3, 3].
-        chest, head: turns; None where no frame follows them. limbs: by the robot's limbs.
-    """
-
-    pelvis: Array
-    turn: Array
-    chest: Array
-    head: Array | None
-    limbs: Mapping[str, LimbPlaces]
-
-    @cached_property
-    def heading(self) -> Array:
-        """Turns of the pelvis about the vertical alone [frames, 3, 3]."""
-        return _headings(self.turn)
 
 
 def normalised(vectors: Array, fallback: Array) -> Array:
@@ -71,8 +34,7 @@ def normalised(vectors: Array, fallback: Array) -> Array:
 def frames_of(first: Array, second: Array) -> Array:
     """Rotations whose y axis is along ``first`` and whose z axis is nearest to ``second`` [frames, 3, 3]."""
     y = normalised(first, np.array([0.0, 1.0, 0.0]))
-    across = np.cross(y, second)
-    x = normalised(across, np.cross(y, np.array([0.0, 0.0, 1.0])))
+    x = normalised(np.cross(y, second), np.cross(y, np.array([0.0, 0.0, 1.0])))
     x = normalised(x, np.array([1.0, 0.0, 0.0]))
     return np.stack([x, y, np.cross(x, y)], axis=-1)
 
@@ -83,77 +45,73 @@ def lift(heights: Array) -> Array:
 
 
 class Mapper:
-    """Turns points of a skeleton into targets of a robot; the same for a clip and for one frame."""
+    """Turns points of a skeleton into targets of a robot's body; the same for a clip and for one frame."""
 
-    def __init__(self, match: Correspondence) -> None:
-        self.match = match
+    def __init__(self, match: Correspondence, rate: float) -> None:
+        self.match, self._dt = match, 1.0 / rate
         body, rest, axes = match.body, match.skeleton.rest, match.body.axes
-        bases = {limb.source: limb.base for limb in match.limbs.values()}
+        self.limbs = tuple(name for name in body.limbs if name in match.limbs)
+        self._leads, own = [match.limbs[name] for name in self.limbs], [body.limbs[name] for name in self.limbs]
+        bases = {one.source: one.base for one in match.limbs.values()}
         legs, arms = ([bases[k] for k in (f"left_{kind}", f"right_{kind}") if k in bases] for kind in ("leg", "arm"))
         both = [pair for pair in (legs, arms, list(bases.values())) if len(pair) > 1] or [list(bases.values()) * 2]
         #: points of left and right hip, of shoulders where the skeleton has no legs; and of shoulders that lead arms
         self._hips = [both[0][0], both[0][-1]]
-        leads = "left_arm" in match.limbs and body.plan.upright and len(arms) > 1
+        upright, free = body.plan.upright, body.robot.base != "fixed"
+        leads = "left_arm" in match.limbs and upright and len(arms) > 1
         self._shoulders = arms if leads else self._hips
         #: what is above the hips
         self._top = arms if leads else [match.chest]
-        self._trunk = self._trunk_frames(rest[None])
-        #: knees, elbows and wrists follow the skeleton and may meet the ground
-        self._lies = body.plan.upright and body.robot.base != "fixed"
-        hips = rest[self._hips].mean(axis=0)
-        waist = body.places[0] if body.waist is None else body.waist
-        #: from the pelvis to the waist, in the body's axes [m]
+        self._trunk_at_rest = self._trunk(rest[None])
+        self._feet = [k for k, name in enumerate(self.limbs) if body.is_foot(name)]
+        self._legs = [k for k, name in enumerate(self.limbs) if name.endswith("leg") and upright and free]
+        #: of limbs: whether the chest carries one, where its base is from what carries it, in the body's axes [m]
+        self._from_chest = np.array([upright and name.endswith("arm") for name in self.limbs])[:, None]
+        places, waist = np.array([limb.places for limb in own]), body.places[0] if body.waist is None else body.waist
         self._waist = (waist - body.places[0]) @ axes
-        #: hip or shoulder of each robot's limb from the pelvis, or from the waist, in the body's axes [m]
-        self._bases: dict[str, Array] = {}
-        #: heights of the robot's ankles, or of the centres of point feet, above the ground that they stand on [m]
-        self._heights: dict[str, float] = {}
-        #: from where the skeleton's foot would be to where the robot's is, both at rest, in the body's axes [m]
-        self._shifts: dict[str, Array] = {}
-        #: of the robot's limbs: base to middle, middle to wrist, wrist to contact [m]
-        self._lengths: dict[str, Array] = {}
+        self._bases = (places[:, 0] - np.where(self._from_chest, waist, body.places[0])) @ axes
+        #: base to middle, middle to wrist, wrist to end; and what lies on the ground is as thick [limbs, 3] [m]
+        self._lengths = np.linalg.norm(np.diff(places, axis=1), axis=2)
+        lies = np.array([upright and free and not body.is_foot(name) for name in self.limbs])
+        self._thick = np.array([limb.thickness for limb in own])
+        self._ground = np.where(lies[:, None], self._thick, NO_GROUND)
+        #: height of the robot's ankle, or of the centre of a point foot, above the ground that it stands on [m]
+        self._heights = np.array([self._height(name) for name in self.limbs])
         #: points of all limbs, from base to tip; directions of their bones at rest, where one has no length
-        self._chains = np.array([one.chain for one in match.limbs.values()])
+        self._chains = np.array([one.chain for one in self._leads])
         bones = np.diff(rest[self._chains], axis=1)
         self._still = bones / np.maximum(np.linalg.norm(bones, axis=2, keepdims=True), 1e-9)
-        for name, limb in body.limbs.items():
-            self._bases[name] = (limb.base - (waist if self._from_chest(name) else body.places[0])) @ axes
-            over = float((limb.places[2] - limb.places[3]) @ axes[:, 2])
-            self._heights[name] = limb.radius + over * (limb.contact == "flat")
-        for name, one in match.limbs.items():
-            limb = body.limbs[name]
-            foot, end = (limb.places[2] - body.places[0]) @ axes, (rest[one.end] - hips) @ match.axes
-            if body.plan.upright:
-                foot[0], end[0] = ((limb.base - body.places[0]) @ axes)[0], ((rest[one.base] - hips) @ match.axes)[0]
-            self._shifts[name] = np.asarray(foot - match.scale * end)
-            self._lengths[name] = np.linalg.norm(np.diff(limb.places, axis=0), axis=1)
+        self._tipless = [k for k, one in enumerate(self._leads) if one.tip == one.end]
+        # From where the skeleton's foot would be to where the robot's is, both at rest, in the body's axes
+        apart = (places - body.places[0]) @ axes
+        apart -= match.scale * (rest[self._chains] - rest[self._hips].mean(axis=0)) @ match.axes
+        self._shifts = apart[:, 2]
+        if upright:
+            self._shifts[:, 0] = apart[:, 0, 0]
 
-    def _from_chest(self, name: str) -> bool:
-        """Whether the chest carries a robot's limb."""
-        return self.match.body.plan.upright and name.endswith("arm")
+    def _height(self, name: str) -> float:
+        """Height of a robot's ankle, or of the centre of a point foot, above the ground that it stands on [m]."""
+        limb = self.match.body.limbs[name]
+        over = float((limb.places[2] - limb.places[3]) @ self.match.body.axes[:, 2])
+        return limb.radius + over * (limb.contact == "flat")
 
-    def _trunk_frames(self, points: Array) -> list[Array]:
+    def _trunk(self, points: Array) -> list[Array]:
         """Rotations of pelvis and chest as the points show them [frames, 3, 3]."""
         ahead = points[:, self._top].mean(axis=1) - points[:, self._hips].mean(axis=1)
         return [frames_of(points[:, a] - points[:, b], ahead) for a, b in (self._hips, self._shoulders)]
 
-    def places(self, points: Array, turns: Array | None, ankle: dict[str, float]) -> Places:
-        """Targets of frames.
-
-        Args:
-            points: [frames, joints, 3] [m]. turns: [frames, joints, 3, 3]. ankle: height above the clip's zero at which
-                each leading limb's end stands [m].
+    def targets(self, points: Array, turns: Array | None, ankle: Mapping[str, float]) -> Targets:
+        """Of points [frames, joints, 3] [m] and turns [frames, joints, 3, 3]; ``ankle``: height above the clip's zero
+        at which each leading limb's end stands [m].
         """
-        match, body, axes = self.match, self.match.body, self.match.axes
+        match, body, axes, count = self.match, self.match.body, self.match.axes, len(points)
         if turns is not None:
             pelvis, chest = turns[:, match.pelvis] @ axes, turns[:, match.chest] @ axes
         else:
-            pelvis, chest = (
-                now @ before[0].T @ axes for now, before in zip(self._trunk_frames(points), self._trunk, strict=True)
-            )
-        lying = match.all_fours and match.upright and not body.plan.upright
-        turned = LYING_TRUNK if lying else np.eye(3)
-        pelvis, chest = pelvis @ turned, chest @ turned
+            now = zip(self._trunk(points), self._trunk_at_rest, strict=True)
+            pelvis, chest = (turn @ rest[0].T @ axes for turn, rest in now)
+        if match.all_fours and match.upright and not body.plan.upright:
+            pelvis, chest = pelvis @ LYING_TRUNK, chest @ LYING_TRUNK
         hips = points[:, self._hips].mean(axis=1)
         if body.robot.base == "fixed":
             # The robot's trunk stands where it stands: arms move as seen from the pelvis
@@ -164,87 +122,75 @@ class Mapper:
             pelvis, chest = still @ pelvis * mirror, still @ chest * mirror
             place = np.broadcast_to(body.places[0], hips.shape).copy()
         else:
-            ground = min((ankle[m.source] for name, m in match.limbs.items() if name.endswith("leg")), default=0.0)
-            lift = np.array([0.0, 0.0, self._heights.get("left_leg", 0.0)])
-            place = match.scale * (hips - np.array([0.0, 0.0, ground])) + lift
-        head = turns[:, match.head] @ axes if turns is not None and match.head >= 0 and body.head else None
-        ways = np.swapaxes(points[:, self._chains[:, 1:]] - points[:, self._chains[:, :-1]], 0, 1)
-        bones = dict(zip(match.limbs, normalised(ways, self._still[:, None]), strict=True))
-        place[:, 2] += self._rise(bones, place, pelvis)
-        trunk = Places(place, pelvis, chest, head, {})
-        limbs = {name: self._limb(name, points, bones[name], turns, trunk, ankle) for name in match.limbs}
-        return replace(trunk, limbs=limbs)
+            ground = min((ankle[match.limbs[name].source] for name in self.limbs if name.endswith("leg")), default=0.0)
+            place = match.scale * (hips - np.array([0.0, 0.0, ground]))
+            place[:, 2] += self._height("left_leg") if "left_leg" in body.limbs else 0.0
+        bones = normalised(np.diff(points[:, self._chains], axis=2), self._still)
+        bases = place[:, None] + self._bases @ np.swapaxes(pelvis, 1, 2)
+        above = (place + pelvis @ self._waist)[:, None] + self._bases @ np.swapaxes(chest, 1, 2)
+        bases = np.where(self._from_chest, above, bases)
+        if self._legs:
+            # Knees lie on the ground and not in it
+            knees = bases[:, self._legs, 2] + self._lengths[self._legs, 0] * bones[:, self._legs, 0, 2]
+            rise = lift(knees - self._thick[self._legs, 0]).max(axis=1, initial=0.0)
+            place[:, 2] += rise
+            bases[..., 2] += rise[:, None]
+        bones[:, self._tipless, 2] = bones[:, self._tipless, 1]
+        chains, headings = np.empty((count, len(self.limbs), 4, 3)), _headings(pelvis)
+        chains[:, :, 0] = bases
+        for k in range(3):
+            step = self._lengths[:, k, None] * bones[:, :, k]
+            chains[:, :, k + 1] = _next_joint(chains[:, :, k], step, self._ground[:, k], headings)
+        known = {"pelvis": pelvis, "chest": chest}
+        if turns is not None and match.head >= 0 and body.head:
+            known["head"] = turns[:, match.head] @ axes
+        for k, name in enumerate(self.limbs):
+            if k not in self._feet and turns is not None:
+                known[name] = turns[:, self._leads[k].end] @ axes
+            elif k in self._feet:
+                stood = np.array([0.0, 0.0, ankle[self._leads[k].source]])
+                foot = match.scale * (points[:, self._leads[k].end] - stood)
+                foot[:, :2] += (headings @ self._shifts[k])[:, :2]
+                foot[:, 2] += self._heights[k]
+                chains[:, k, 2:] = foot[:, None]
+                if body.limbs[name].contact == "flat":
+                    known[name] = self._turn_of_foot(self._leads[k], points, turns, pelvis, headings)
+                    chains[:, k, 3] -= self._heights[k] * known[name][:, :, 2]
+        stands, held, lies = np.zeros((3, count, len(self.limbs)), dtype=bool)
+        return Targets(self.limbs, self._dt, place, chains, known, stands, held, lies)
 
-    def _rise(self, bones: Mapping[str, Array], place: Array, pelvis: Array) -> Array:
-        """How much the trunk must be higher so that knees lie on the ground and not in it [frames] [m]."""
-        rise = np.zeros(len(place))
-        for name in bones if self._lies else ():
-            if name.endswith("leg"):
-                knees = place[:, 2] + pelvis[:, 2] @ self._bases[name] + self._lengths[name][0] * bones[name][:, 0, 2]
-                rise = np.maximum(rise, lift(knees - self.match.body.limbs[name].thickness[0]))
-        return rise
-
-    def _limb(
-        self, name: str, points: Array, bones: Array, turns: Array | None, trunk: Places, ankle: dict[str, float]
-    ) -> LimbPlaces:
-        """Targets of a limb, of the directions of its three bones [frames, 3, 3]."""
-        match, limb = self.match.limbs[name], self.match.body.limbs[name]
-        if match.tip == match.end:
-            bones[:, 2] = bones[:, 1]
-        base = trunk.pelvis + trunk.turn @ self._bases[name]
-        if self._from_chest(name):
-            base = trunk.pelvis + trunk.turn @ self._waist + trunk.chest @ self._bases[name]
-        upper, lower, hand = self._lengths[name]
-        middle = base + upper * bones[:, 0]
-        rotation = self._rotation(match, points, turns, trunk, limb.contact == "flat")
-        if not self.match.body.is_foot(name):
-            lie = limb.thickness if self._lies else (-np.inf,) * 3
-            middle = _next_joint(base, upper * bones[:, 0], lie[0], trunk.heading)
-            wrist = _next_joint(middle, lower * bones[:, 1], lie[1], trunk.heading)
-            end = _next_joint(wrist, hand * bones[:, 2], lie[2], trunk.heading)
-            return LimbPlaces(base, middle, wrist, end, rotation if turns is not None else None)
-        height = np.array([0.0, 0.0, self._heights[name]])
-        wrist = self.match.scale * (points[:, match.end] - np.array([0.0, 0.0, ankle[match.source]])) + height
-        wrist[:, :2] += (trunk.heading @ self._shifts[name])[:, :2]
-        if limb.contact != "flat":
-            return LimbPlaces(base, middle, wrist, wrist, None)
-        end = wrist + (-height if rotation is None else rotation @ -height)
-        return LimbPlaces(base, middle, wrist, end, rotation)
-
-    def _rotation(
-        self, match: LimbMatch, points: Array, turns: Array | None, trunk: Places, foot: bool
-    ) -> Array | None:
-        """Of the foot or hand, in the body's axes at rest."""
+    def _turn_of_foot(
+        self, lead: LimbMatch, points: Array, turns: Array | None, pelvis: Array, headings: Array
+    ) -> Array:
+        """Rotations of a flat foot, in the body's axes at rest [frames, 3, 3]."""
         axes, rest = self.match.axes, self.match.skeleton.rest
         if turns is not None:
-            return np.asarray(turns[:, match.end] @ axes)
-        if not foot:
-            return None
-        if match.tip == match.end:
-            return trunk.heading
+            return np.asarray(turns[:, lead.end] @ axes)
+        if lead.tip == lead.end:
+            return headings
         # Along the foot, as far as its rest is turned from there; the hips say where its side is
-        forward = rest[match.tip] - rest[match.end]
+        forward = rest[lead.tip] - rest[lead.end]
         before = frames_of(axes[:, 1][None], np.cross(forward, axes[:, 1])[None])[0]
-        ahead, left = points[:, match.tip] - points[:, match.end], trunk.turn[:, :, 1]
+        ahead, left = points[:, lead.tip] - points[:, lead.end], pelvis[:, :, 1]
         side = left - ahead * (np.sum(left * ahead, axis=1) / np.maximum(np.sum(ahead**2, axis=1), 1e-12))[:, None]
         return np.asarray(frames_of(side, np.cross(ahead, side)) @ before.T @ axes)
 
 
-def _next_joint(start: Array, bones: Array, thickness: float, headings: Array) -> Array:
-    """Where bones [frames, 3] [m] end; those that would end nearer to the ground than a thickness [m] are turned."""
+def _next_joint(start: Array, bones: Array, ground: Array, headings: Array) -> Array:
+    """Where bones [frames, limbs, 3] [m] end; those that would end below heights of theirs [limbs] [m] are turned."""
     end: Array = start + bones
-    heights = end[:, 2] - thickness
+    heights = end[..., 2] - ground
     if not (heights < FAR_ABOVE * CLEAR).any():
         return end
-    lengths = np.sqrt((bones * bones).sum(axis=1))
-    rise = np.minimum(np.maximum(bones[:, 2] + lift(heights), -lengths), lengths)
+    lengths = np.sqrt((bones * bones).sum(axis=2))
+    rise = np.minimum(np.maximum(bones[..., 2] + lift(heights), -lengths), lengths)
     # The bone goes out level as far as its length says, ahead where it stood upright
-    way = bones[:, :2] + AHEAD_SHARE * lengths[:, None] * headings[:, :2, 0]
-    way /= np.maximum(np.sqrt((way * way).sum(axis=1, keepdims=True)), SHORT)
-    along, more = np.abs((bones[:, :2] * way).sum(axis=1)), bones[:, 2] ** 2 - rise**2
+    way = bones[..., :2] + AHEAD_SHARE * lengths[..., None] * headings[:, None, :2, 0]
+    way /= np.maximum(np.sqrt((way * way).sum(axis=2, keepdims=True)), SHORT)
+    along, more = np.abs((bones[..., :2] * way).sum(axis=2)), bones[..., 2] ** 2 - rise**2
     out = more / np.maximum(along + np.sqrt(np.maximum(along**2 + more, 0.0)), SHORT)
-    end[:, :2] += out[:, None] * way
-    end[:, 2] = start[:, 2] + rise
+    end[..., :2] += out[..., None] * way
+    end[..., 2] = start[..., 2] + rise
     return end
 
 

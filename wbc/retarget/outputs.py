@@ -17,7 +17,7 @@ from wbc import extras, validation
 from wbc.errors import ClipFileError, RangeError, ShapeError
 from wbc.log import Log
 from wbc.log.lerobot import write_lerobot_dataset
-from wbc.multibody import pin
+from wbc.robot.joint_values import joint_values
 from wbc.validation import Array
 
 if TYPE_CHECKING:
@@ -34,25 +34,15 @@ MOTION_FORMATS = {
 
 
 def joint_columns(motion: Retargeted, joints: Sequence[str] | None = None) -> tuple[tuple[str, ...], Array]:
-    """A motion in numbers that need no model: names of joints, and root and joints side by side [frames, 7 + joints].
+    """Names of joints, and root (x, y, z, quaternion x, y, z, w) and joints side by side [frames, 7 + joints] [m, rad].
 
-    The root is the base's position [m] and quaternion x, y, z, w in the world; of joints [rad, m] one that turns
-    without end has its angle, a ball joint its rotation vector.
-
-    Args:
-        joints: their order, or fewer of them; default: the robot's degrees of freedom.
-
-    Raises:
-        UnknownNameError: no such joint.
+    Of joints one that turns without end has its angle, a ball joint its rotation vector; ``joints``: their order, or
+    fewer of them, by default the robot's degrees of freedom.
     """
     robot, q = motion.robot, validation.ordinary_array("motion.q", motion.q)
-    model, first = robot.model, robot.base_nv
+    first = robot.base_nv
     root = q[:, :7] if first else np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (len(q), 1))
-    names, places = robot.dof_names[first:], robot.position_index[first:]
-    turned = np.array([pin.difference(model, pin.neutral(model), row) for row in q])[:, first:]
-    endless = [column - first for column, count in zip(model.idx_vs, model.nqs, strict=True) if count == 2]
-    turned[:, endless] = np.unwrap(turned[:, endless], axis=0)
-    positions = np.where(places >= 0, q[:, places], turned)
+    names, positions = robot.dof_names[first:], joint_values(robot, q)
     chosen = names if joints is None else tuple(validation.one_of("joints", name, names) for name in joints)
     return chosen, np.column_stack((root, positions[:, [names.index(name) for name in chosen]]))
 

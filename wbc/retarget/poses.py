@@ -13,11 +13,7 @@ from wbc.symbolic.joint_steps import JointKind, JointStep, joint_steps
 
 
 def frame_poses(robot: Robot, names: tuple[str, ...], q: Array) -> tuple[Array, Array]:
-    """Rotations [configurations, names, 3, 3] and positions [configurations, names, 3] [m] of frames.
-
-    Args:
-        q: configurations [configurations, nq].
-    """
+    """Rotations [n, names, 3, 3] and positions [n, names, 3] [m] of frames at configurations [n, nq]."""
     model = robot.model
     frames = [model.frames[int(model.getFrameId(name))] for name in names]
     poses = {0: (np.broadcast_to(np.eye(3), (len(q), 3, 3)), np.zeros((len(q), 3)))}

@@ -11,9 +11,9 @@ import numpy as np
 
 from wbc.retarget.clip import Array, Clip, Marks, intervals
 from wbc.retarget.figures import motion_figures
-from wbc.retarget.plan import MotionPlan
 from wbc.retarget.poses import frame_poses
 from wbc.retarget.robot_body import RobotBody
+from wbc.retarget.targets import Targets
 from wbc.robot import Robot
 
 #: A stance counts from where its contact is this near to its place [m]
@@ -61,7 +61,7 @@ class MotionErrors:
     def of(cls, points: dict[str, Array], figures: dict[str, Any]) -> MotionErrors:
         """Those of some distances, and of figures of :func:`~wbc.retarget.motion_figures`."""
         errors = {name: {"mean": float(d.mean()), "largest": float(d.max())} for name, d in points.items()}
-        mean = float(np.mean([values.mean() for values in points.values()]))
+        mean = float(np.mean([one["mean"] for one in errors.values()]))
         return cls(points, {**figures, "error": mean, "errors": errors})
 
     @property
@@ -109,7 +109,7 @@ class Retargeted:
     notes: tuple[str, ...]
     clip: Clip
     body: RobotBody
-    plan: MotionPlan
+    plan: Targets
     every: int
     all_q: Array
 
@@ -128,36 +128,33 @@ class Retargeted:
         return MotionErrors.of(dict(zip(points, np.linalg.norm(places - targets, axis=2).T, strict=True)), figures)
 
 
-def key_points(body: RobotBody, plan: MotionPlan) -> dict[str, tuple[str, Array]]:
+def key_points(body: RobotBody, plan: Targets) -> dict[str, tuple[str, Array]]:
     """Name -> frame of the robot, and where the plan wants it [ticks, 3] [m]."""
     out = {} if body.robot.base == "fixed" else {"pelvis": (body.pelvis, plan.pelvis)}
-    for name, limb in plan.limbs.items():
+    for name, (_, middle, wrist, end) in zip(plan.limbs, plan.chains.transpose(1, 2, 0, 3), strict=True):
         own = body.limbs[name]
         if body.plan.upright:
-            out[f"{name} middle"] = own.middle, limb.middle
+            out[f"{name} middle"] = own.middle, middle
             if own.wrist and name.endswith("arm"):
-                out[f"{name} wrist"] = own.wrist, limb.wrist
-        out[name] = own.end, limb.end
+                out[f"{name} wrist"] = own.wrist, wrist
+        out[name] = own.end, end
     return out
 
 
 def served(
-    robot: Robot, body: RobotBody, plan: MotionPlan, q: Array, gave: Sequence[tuple[int, tuple[str, ...]]]
+    robot: Robot, body: RobotBody, plan: Targets, q: Array, gave: Sequence[tuple[int, tuple[str, ...]]]
 ) -> tuple[dict[str, Marks], tuple[GivenUp, ...]]:
     """Limb -> whether its contact stands [ticks], of each stance the longest time for which nothing slips; and what was
-    not served: rows that gave way, contacts that come late or are not held, and limbs far from their targets.
-
-    Args:
-        q: configurations [ticks, nq]. gave: ticks at which rows gave way, with their names.
+    not served: rows that gave way at ticks, contacts that come late or are not held, and limbs far from their targets.
     """
     ends = {name: at for name, at in key_points(body, plan).items() if name in plan.limbs or name.endswith("wrist")}
     rotations, positions = frame_poses(robot, tuple(frame for frame, _ in ends.values()), q)
     far: dict[str, Array] = {}
     for k, (name, (_, target)) in enumerate(ends.items()):
-        away, turned = (positions[:, k] - target)[:, None], plan.limbs[name].rotation if name in plan.limbs else None
-        if turned is not None and body.limbs[name].contact == "flat":
+        away = (positions[:, k] - target)[:, None]
+        if name in plan.turns and body.limbs[name].contact == "flat":
             # Of a sole the corner that is farthest off
-            away = away + body.limbs[name].corners @ np.swapaxes(rotations[:, k] - turned, 1, 2)
+            away = away + body.limbs[name].corners @ np.swapaxes(rotations[:, k] - plan.turns[name], 1, 2)
         far[name] = np.linalg.norm(away, axis=2).max(axis=1)
     stance, given = dict[str, Marks](), list[GivenUp]()
 
@@ -170,10 +167,10 @@ def served(
 
     for row in dict.fromkeys(name for _, names in gave for name in names):
         ticks = [tick for tick, names in gave if row in names]
-        say(row, np.isin(np.arange(plan.ticks), ticks), "gave way to limits of the joints")
-    for name, limb in plan.limbs.items():
-        stance[name], late = np.zeros((2, plan.ticks), dtype=bool)
-        for a, b in intervals(limb.stands):
+        say(row, np.isin(np.arange(len(q)), ticks), "gave way to limits of the joints")
+    for name, stands in zip(plan.limbs, plan.stands.T, strict=True):
+        stance[name], late = np.zeros((2, len(q)), dtype=bool)
+        for a, b in intervals(stands):
             still = intervals(far[name][a:b] <= LANDED)
             first, last = max(still, key=lambda run: run[1] - run[0], default=(b - a, b - a))
             stance[name][a + first : a + last] = True

@@ -15,7 +15,7 @@ from wbc.retarget.engine import Engine
 from wbc.retarget.live import LiveRetargeter
 from wbc.retarget.mapping import Mapper
 from wbc.retarget.options import RetargetOptions
-from wbc.retarget.plan import plan_motion
+from wbc.retarget.plan import Planner
 from wbc.retarget.retargeted import Retargeted, served
 from wbc.retarget.robot_body import RobotBody, body_of
 from wbc.retarget.stances import Stances, find_stances
@@ -99,10 +99,12 @@ class Retargeter:
         dt = 1.0 / (rate * every)
         frames = int(np.floor((len(clip.points) - 1) / clip.rate * rate + 1e-6)) + 1
         times: Array = np.asarray(np.arange((frames - 1) * every + 1) * dt, dtype=np.float64)
-        places = Mapper(match).places(clip.points, clip.turns, stances.ankle)
-        marks = {name: stances.marks[limb.source] for name, limb in match.limbs.items()}
-        plan = plan_motion(self.body, places, marks, clip.rate, times)
-        engine = self.engine(tuple(match.limbs), dt, head=plan.head is not None)
+        mapper = Mapper(match, clip.rate)
+        targets = mapper.targets(clip.points, clip.turns, stances.ankle)
+        for k, name in enumerate(mapper.limbs):
+            targets.stands[:, k] = stances.marks[match.limbs[name].source]
+        plan = Planner(self.body, mapper.limbs).plan(targets, times)
+        engine = self.engine(mapper.limbs, dt, head="head" in plan.turns)
         all_q, gave = engine.run(plan)
         landed, given_up = served(engine.robot, self.body, plan, all_q, gave)
         return Retargeted(
@@ -123,8 +125,8 @@ class Retargeter:
         match = self.correspondence()
         rate = validation.scalar("rate", rate, low=1.0, high=1000.0, unit="Hz")
         every = max(int(np.ceil(self.options.tick_rate / rate - 1e-9)), 1)
-        engine = self.engine(tuple(match.limbs), 1.0 / (rate * every))
-        return LiveRetargeter(match, engine, match.skeleton, rate, every)
+        limbs = tuple(name for name in self.body.limbs if name in match.limbs)
+        return LiveRetargeter(match, self.engine(limbs, 1.0 / (rate * every)), rate, every)
 
     def engine(self, limbs: tuple[str, ...], dt: float, *, head: bool = False) -> Engine:
         """The compiled stack for ticks of some length; made once."""

@@ -63,19 +63,14 @@ LONGEST_FINGER = 0.25
 
 @dataclass(frozen=True)
 class RobotLimb:
-    """A leg or an arm of a robot, or a finger, whose knuckles are base, middle and wrist.
-
-    Positions are in the world at ``robot.neutral``.
+    """A leg or an arm of a robot, or a finger, whose knuckles are base, middle and wrist; the world is at rest.
 
     Attributes:
-        joints: numbers of its joints from the trunk on.
-        middle: frame at the hinge of knee or elbow.
-        wrist: frame at the ankle or wrist; "" where the last bone ends in the contact point itself.
-        end: frame of the contact: of a flat foot below the ankle in the sole, forward, left and up at rest; of a point
-            foot, and of a hand, at the centre of its ball.
-        places: base, middle, wrist, end [4, 3].
-        radius: of the ball; 0 of a flat foot [m].
-        corners: points of the sole in the contact frame [corners, 3] [m]; of a ball its centre.
+        joints: numbers of its joints from the trunk on. middle, wrist: frames at knee and ankle, or elbow and wrist;
+            no wrist, "", where the last bone ends in the contact point itself.
+        end: frame of the contact: of a flat foot below the ankle in the sole, with the body's axes; of a point foot,
+            and of a hand, at the centre of its ball. places: of base, middle, wrist, end [4, 3] [m].
+        radius: of the ball; 0 of a flat foot [m]. corners: of the sole, or the ball's centre, in the contact frame.
         surface: corners of the hull of what the end is made of, in the contact frame [corners, 3] [m].
         thickness: height of middle, wrist and end above the ground where the limb lies on it [m].
         pitch: least and most turn of the end against its last bone, from the bone along the end's z axis, about the
@@ -124,10 +119,9 @@ class RobotBody:
     """What retargeting knows of a robot.
 
     Attributes:
-        robot: with the frames of pelvis, chest, feet and hands added.
-        plan: of its joints. limbs: by name of :data:`wbc.retarget.body.LIMBS`, or :data:`wbc.retarget.hands.FINGERS`.
-        pelvis, chest: frames at the middle of hips and of shoulders, with the body's axes at rest; of a hand at its
-            palm.
+        robot: with the frames of pelvis, chest, feet and hands added. plan: of its joints.
+        limbs: by name of :data:`wbc.retarget.body.LIMBS`, or :data:`wbc.retarget.hands.FINGERS`.
+        pelvis, chest: frames between hips and between shoulders, or in a palm, with the body's axes at rest.
         places: of the two at rest [2, 3]. waist: where the axes between them meet; None where one link is both.
         head: frame of the head, with the body's axes at rest; "" without a neck.
         height: of the pelvis above the ground where the robot stands as at rest [m].
@@ -169,16 +163,13 @@ class RobotBody:
         return _is_foot(name, self.plan, self.robot.base == "fixed")
 
 
-#: Frame -> the joint that carries it, and its pose in the world at rest
-Frames = dict[str, tuple[int, pin.SE3]]
-
-
 class RestPose:
     """A robot at ``robot.neutral``.
 
     Attributes:
         poses: of its joints. axes: directions of the joints in the world, zero of those of several degrees of freedom
             [joints, 3]. balls: of its links, by joint. tree: of its joints, with one more at the end of each last link.
+        frames: that were found -> the joint that carries one, and its pose.
     """
 
     def __init__(self, robot: Robot, balls: dict[int, LinkBalls]) -> None:
@@ -186,8 +177,10 @@ class RestPose:
         pin.forwardKinematics(model, data, robot.neutral)
         pin.updateFramePlacements(model, data)
         pin.computeJointJacobians(model, data, robot.neutral)
-        self.robot, self.fixed, self.balls, self._data = robot, robot.base == "fixed", balls, data
+        self.robot, self.fixed, self.balls = robot, robot.base == "fixed", balls
+        self.frames: dict[str, tuple[int, pin.SE3]] = {}
         self.poses, self.axes = list(data.oMi), np.zeros((model.njoints, 3))
+        self._links = [(int(f.parentJoint), np.array(data.oMf[k].translation)) for k, f in enumerate(model.frames)]
         for joint in np.flatnonzero(np.array(model.nvs) == 1).tolist():
             twist = data.J[:, int(model.idx_vs[joint])]
             self.axes[joint] = twist[3:] if np.abs(twist[3:]).max() > 1e-9 else twist[:3]
@@ -200,23 +193,20 @@ class RestPose:
             names.append(f"{names[joint]} end")
             points.append(self._tip(joint, ancestors(parents, joint)[:-1]))
             parents.append(joint)
-        offsets = [
-            point - points[parent] if parent >= 0 else point for point, parent in zip(points, parents, strict=True)
-        ]
-        self.tree = Skeleton(tuple(names), tuple(parents), np.array(offsets), (False,) * len(names))
-        self.points = self.tree.rest
+        self.points = np.array(points)
+        offsets = self.points - np.where(np.array(parents)[:, None] >= 0, self.points[parents], 0.0)
+        self.tree = Skeleton(tuple(names), tuple(parents), offsets, (False,) * len(names))
 
     def _tip(self, joint: int, chain: list[int]) -> Array:
         """The point of a last link that is farthest from the joint before; ``chain``: it and the joints above it."""
         places = np.array([self.poses[k].translation for k in (*chain, 0)])
-        here, frames = places[0], self.robot.model.frames
-        points = [np.array(self._data.oMf[k].translation) for k, f in enumerate(frames) if int(f.parentJoint) == joint]
+        here, points = places[0], [place for carrier, place in self._links if carrier == joint]
         if joint in self.balls:
             points.append(self.poses[joint].act(self.balls[joint].middle))
         most = max(LONGEST * float(np.linalg.norm(np.diff(places[:-1], axis=0), axis=1).sum()), 0.05)
-        away = [float(np.linalg.norm(point - here)) for point in points]
-        away = [length if length < most else 0.0 for length in away]
-        if max(away, default=0.0) > 1e-3:
+        away = np.array([float(np.linalg.norm(point - here)) for point in points])
+        away[away >= most] = 0.0
+        if away.max(initial=0.0) > 1e-3:
             return points[int(np.argmax(away))]
         before = 2 if len(chain) > 1 and float(np.linalg.norm(here - places[1])) < 1e-9 else 1
         return np.asarray(here + HAND * (here - places[before]))
@@ -235,13 +225,16 @@ class RestPose:
             return 0.0
         return float((balls.centers @ (self.poses[joint].rotation.T @ way) + balls.radii).max())
 
+    def framed(self) -> Robot:
+        """The robot with the frames that were found."""
+        robot = self.robot
+        for frame, (joint, pose) in self.frames.items():
+            robot = with_frame(robot, frame, joint, self.poses[joint].actInv(pose))
+        return robot
+
 
 def body_of(robot: Robot) -> RobotBody:
-    """Find limbs, trunk and soles of a robot, or the fingers of one that is a hand.
-
-    Raises:
-        BodyError: it has no pair of limbs.
-    """
+    """Limbs, trunk and soles of a robot, or fingers of a hand; :class:`BodyError` where it has no pair of limbs."""
     if robot.base not in ("fixed", "floating"):
         raise BodyError("robot", robot.name, f"its base is {robot.base}; load it with base='floating' or 'fixed'")
     rest = RestPose(robot, {})
@@ -252,23 +245,16 @@ def body_of(robot: Robot) -> RobotBody:
     said = plan.tree.said([*plan.limbs.values()])
     if not rest.fixed and "left_arm" not in plan.limbs and said & ARM_WORDS and not said & LEG_WORDS:
         raise BodyError("robot", robot.name, "it has arms and no legs to stand on; load it with base='fixed'")
-    limbs, frames = dict[str, RobotLimb](), Frames()
-    for name in plan.limbs:
-        limbs[name], own = fill(name, rest, plan)
-        frames |= own
-    places = []
+    limbs = {name: fill(name, rest, plan) for name in plan.limbs}
+    places, waist, up = list[Array](), None, plan.axes[:, 2]
     for kind in ("arm" if rest.fixed else "leg", "arm"):
         # Of a hand between the first and the last finger
         bases = [limb.base for name, limb in limbs.items() if name.endswith(kind)] or [k.base for k in limbs.values()]
         places.append(np.asarray(0.5 * (bases[0] + bases[-1])))
-    pelvis, chest = places
-    carriers = {"pelvis": (plan.pelvis, pelvis), "chest": (plan.chest, chest)}
+    carriers = {"pelvis": (plan.pelvis, places[0]), "chest": (plan.chest, places[1])}
     if plan.head and plan.upright:
         carriers["head"] = (max(joint for joint in plan.head if joint < robot.model.njoints), rest.points[plan.head[0]])
-    frames |= {f"retarget_{name}": (joint, pin.SE3(plan.axes, place)) for name, (joint, place) in carriers.items()}
-    new, waist, up = robot, None, plan.axes[:, 2]
-    for frame, (joint, pose) in frames.items():
-        new = with_frame(new, frame, joint, rest.poses[joint].actInv(pose))
+    rest.frames |= {f"retarget_{name}": (joint, pin.SE3(plan.axes, place)) for name, (joint, place) in carriers.items()}
     if plan.chest != plan.pelvis:
         between = [j for j in plan.tree.path(plan.pelvis, plan.chest)[1:] if j < robot.model.njoints]
         waist = rest.meeting(between[:MEETING], np.mean(rest.points[between], axis=0))
@@ -278,11 +264,10 @@ def body_of(robot: Robot) -> RobotBody:
     if lowest < min(stretched, default=-np.inf):
         log.warning("%s: its trunk reaches below its soles wherever they are, and is let into the ground", robot.name)
         balls = {joint: own for joint, own in balls.items() if joint != plan.pelvis}
-    heights = [limb.places[3] @ up - limb.radius for limb in feet]
+    ground = min((limb.places[3] @ up - limb.radius for limb in feet), default=0.0)
     return RobotBody(
-        robot=new, plan=plan, limbs=limbs, pelvis="retarget_pelvis", chest="retarget_chest",
-        places=np.array(places), waist=waist, head="retarget_head" if "head" in carriers else "",
-        height=float(pelvis @ up - min(heights, default=0.0)), balls=balls,
+        rest.framed(), plan, limbs, "retarget_pelvis", "retarget_chest", np.array(places), waist,
+        "retarget_head" if "head" in carriers else "", float(places[0] @ up - ground), balls,
     )  # fmt: skip
 
 
@@ -309,21 +294,19 @@ def hand_plan(rest: RestPose) -> BodyPlan | None:
     return plan if rest.fixed and longest <= LONGEST_FINGER else None
 
 
-def _finger(name: str, rest: RestPose, plan: BodyPlan) -> tuple[RobotLimb, Frames]:
-    """A finger, and its frames."""
+def _finger(name: str, rest: RestPose, plan: BodyPlan) -> RobotLimb:
+    """A finger; its frames are put among those of the pose."""
     chain, frame = plan.limbs[name], f"retarget_{name}"
     places = rest.points[list(chain)]
     joints = tuple(k for k in plan.tree.path(plan.pelvis, chain[-1])[1:] if k < rest.robot.model.njoints)
-    parts = {f"{frame}_middle": (chain[1], places[1]), frame: (joints[-1], places[-1])}
     wrist = f"{frame}_wrist" * (len(chain) > 3)
-    if wrist:
-        parts[wrist] = (chain[2], places[2])
-    limb = RobotLimb(joints, f"{frame}_middle", wrist, frame, places if wrist else places[[0, 1, 2, 2]])
-    return limb, {part: (joint, pin.SE3(plan.axes, place)) for part, (joint, place) in parts.items()}
+    parts = {f"{frame}_middle": (chain[1], 1), frame: (joints[-1], -1)} | ({wrist: (chain[2], 2)} if wrist else {})
+    rest.frames |= {part: (joint, pin.SE3(plan.axes, places[k])) for part, (joint, k) in parts.items()}
+    return RobotLimb(joints, f"{frame}_middle", wrist, frame, places if wrist else places[[0, 1, 2, 2]])
 
 
-def _limb(name: str, rest: RestPose, plan: BodyPlan) -> tuple[RobotLimb, Frames]:
-    """A leg or an arm, and its frames."""
+def _limb(name: str, rest: RestPose, plan: BodyPlan) -> RobotLimb:
+    """A leg or an arm; its frames are put among those of the pose."""
     points, frame, chain, foot = rest.points, f"retarget_{name}", plan.limbs[name], _is_foot(name, plan, rest.fixed)
     joints, tip = tuple(joint for joint in chain if joint < rest.robot.model.njoints), points[chain[-1]]
     last, size = joints[-1], float(np.linalg.norm(tip - points[joints[0]]))
@@ -334,9 +317,8 @@ def _limb(name: str, rest: RestPose, plan: BodyPlan) -> tuple[RobotLimb, Frames]
         base = points[before[0]]
     wrist = _wrist(rest, joints, middle, tip)
     ankle, own = points[wrist] if wrist else tip, rest.balls.get(last)
-    if own is not None and float(np.linalg.norm(own.middle)) > size:
-        own = None
-    there = None if own is None else own.moved(rest.poses[last])
+    known = own is not None and float(np.linalg.norm(own.middle)) <= size
+    there = own.moved(rest.poses[last]) if own is not None and known else None
     end, radius, corners = _end(there, plan.axes, ankle, tip, size, foot=foot)
     solid = LinkBalls(corners, np.full(len(corners), radius)) if there is None else there.moved(end.inverse())
     surface = solid.corners(CORNERS, EXACT)
@@ -345,16 +327,16 @@ def _limb(name: str, rest: RestPose, plan: BodyPlan) -> tuple[RobotLimb, Frames]
         far = surface[surface @ (end.rotation.T @ (end.translation - points[middle])) > 0.0]
         radius = float(np.clip(np.linalg.norm(far, axis=1).max(initial=radius), radius, BALL * radius))
     places = np.array([base, points[middle], ankle if wrist else end.translation, end.translation])
+    carriers = {frame: (last, end), f"{frame}_middle": (middle, rest.poses[middle])}
+    rest.frames |= carriers | ({f"{frame}_wrist": (wrist, rest.poses[wrist])} if wrist else {})
     # A knee lies on its front, an elbow on its back: the outer sides of their bends
     outer = plan.axes[:, 0] if name.endswith("leg") else -plan.axes[:, 0]
-    limb = RobotLimb(
+    return RobotLimb(
         joints, f"{frame}_middle", f"{frame}_wrist" if wrist else "", frame, places, radius, corners, surface,
         (rest.reach(middle, outer), rest.reach(wrist, outer), radius),
         _pitch(rest, plan.axes, joints[joints.index(middle) + 1 :], places),
         _bend(rest, plan.axes[:, 1], middle, places), there is None,
     )  # fmt: skip
-    frames = {frame: (last, end), limb.middle: (middle, rest.poses[middle])}
-    return limb, frames | ({limb.wrist: (wrist, rest.poses[wrist])} if wrist else {})
 
 
 def _pitch(rest: RestPose, axes: Array, joints: tuple[int, ...], places: Array) -> tuple[float, float]:
@@ -383,9 +365,7 @@ def _bend(rest: RestPose, left: Array, middle: int, places: Array) -> float:
 
 
 def _middle_hinge(rest: RestPose, joints: tuple[int, ...], tip: Array) -> int:
-    """The knee or elbow: the joint that changes the distance from where the axes before it meet to the end of the limb
-    most, weighted with how evenly it divides the limb.
-    """
+    """The knee or elbow: the joint that most, and most evenly, changes how far the end is from hip or shoulder."""
 
     def score(count: int) -> float:
         axis, place = rest.axes[joints[count]], rest.points[joints[count]]
@@ -412,11 +392,7 @@ def _wrist(rest: RestPose, joints: tuple[int, ...], middle: int, tip: Array) -> 
 def _end(
     balls: LinkBalls | None, axes: Array, ankle: Array, tip: Array, size: float, *, foot: bool
 ) -> tuple[pin.SE3, float, Array]:
-    """Pose of the contact frame in the world, the radius of its ball, and corners in it.
-
-    Args:
-        balls: of the last link, in the world; None where it has none.
-    """
+    """Pose of the contact frame, radius of its ball, and corners in it, of a last link's balls in the world, if any."""
     flat, point = foot and float(np.linalg.norm(ankle - tip)) > 1e-9, np.zeros((1, 3))
     if balls is None:
         if flat:

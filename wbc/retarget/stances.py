@@ -27,12 +27,7 @@ HAND_HEIGHT = 0.12
 
 @dataclass(frozen=True)
 class Stances:
-    """What stands when.
-
-    Attributes:
-        marks: limb -> whether it stands [frames]. ankle: height of a standing limb's end above the clip's zero, where
-            it stands lowest [m].
-    """
+    """What stands when: limb -> whether it stands [frames], and height of its ankle where it stands lowest [m]."""
 
     marks: dict[str, Marks]
     ankle: dict[str, float]
@@ -70,8 +65,8 @@ def find_stances(feet: Mapping[str, Array], hands: Mapping[str, Array], rate: fl
     so steps of stairs count and a foot that is held in the air does not. A hand stands near the height of the feet.
 
     Args:
-        feet: limb -> its ankle and toe [frames, points, 3]. hands: the same of hands. rate: [Hz]. leg: length of a leg
-            [m], which speeds and heights are counted in.
+        feet, hands: limb -> its ankle and toe [frames, points, 3] [m]. rate: [Hz]. leg: its length, the measure of
+            speeds and heights [m].
     """
     heights = {limb: points[..., 2].min(axis=1) for limb, points in (*feet.items(), *hands.items())}
     marks = {limb: _candidates(points, rate, leg) for limb, points in (*feet.items(), *hands.items())}

@@ -469,7 +469,7 @@ class Robot:
 
         Raises:
             ShapeError: no Limits, or of another number of degrees of freedom.
-            BoundsError: a follower whose range no value of its leader's leads into.
+            BoundsError: a follower whose range no value of its leader leads into.
         """
         limits = validation.instance("limits", limits, Limits, "wbc.robot.Limits")
         validation.real_array("limits.velocity", limits.velocity, (self.nv,), finite=False)
@@ -479,6 +479,11 @@ class Robot:
         rates = [limits.velocity.copy(), limits.acceleration.copy()]
         index, moved = self.position_index, [one for one in self.couplings if one.ratio != 0.0]
         # as often as there are couplings: a follower may lead another
+        for one in (one for one in self.couplings if one.ratio == 0.0):
+            if not low[one.follower] - SAME <= one.offset <= high[one.follower] + SAME:
+                own = [float(low[one.follower]), float(high[one.follower])]
+                reason = f"no value is left: it stands at {one.offset:.6g}, whatever {self.dof_names[one.leader]} does"
+                raise BoundsError(f"limits of {self.dof_names[one.follower]}", own, reason)
         for one in moved * len(moved):
             if index[one.leader] >= 0:
                 low[one.leader], high[one.leader] = self._left(one, low, high)

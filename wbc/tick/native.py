@@ -309,12 +309,7 @@ class CompiledTick(Buffers, ABC):
         return bool(self._unusable[0] == 0.0)
 
     def task_rows(self) -> TaskRows:
-        """Rows of all levels in the last QP.
-
-        Raises:
-            SolverError: there is one level, whose code does not keep them.
-        """
-        self._require_levels("task_rows")
+        """Rows of all levels in the last QP."""
         J = np.zeros((self._layout.task_rows, self._layout.variables))
         self._library.wbc_tick_task_rows(self.pointer, ctypes.c_void_p(J.ctypes.data))
         return TaskRows(J, self._desired.copy(), self._factor.copy())
@@ -325,15 +320,11 @@ class CompiledTick(Buffers, ABC):
         Raises:
             SolverError: there is one level, whose code does not keep it.
         """
-        self._require_levels("curvature")
+        if not self._layout.cascade:
+            raise SolverError("curvature", "one level", "only stacks with strict levels keep this; see qp()")
         out = np.zeros((self._layout.variables, self._layout.variables))
         curved = self._library.wbc_tick_curvature(self.pointer, ctypes.c_void_p(out.ctypes.data))
         return out if curved else None
-
-    def _require_levels(self, asked: str) -> None:
-        """Code of one level makes H of its rows, and keeps no rows."""
-        if not self._layout.cascade:
-            raise SolverError(asked, "one level", "only stacks with strict levels keep this; see qp()")
 
     def row_bounds(self) -> tuple[Array, Array]:
         """Bounds of the general rows in the last QP, those that are minimised at a level included."""

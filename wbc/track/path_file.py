@@ -12,7 +12,8 @@ import json
 import os
 import pathlib
 import tomllib
-from collections.abc import Mapping, Sequence
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -59,6 +60,32 @@ def read_path(file: str | os.PathLike[str]) -> SplinePath:
     # Files are written with few digits: what is a unit quaternion to 1e-3 becomes one
     values[:, 4:] /= np.linalg.norm(values[:, 4:], axis=1, keepdims=True)
     return SplinePath(values[:, 0], list(values[:, 1:]))
+
+
+def rows_of(
+    field: str,
+    file: pathlib.Path,
+    from_csv: Callable[[str], list[tuple[str, Any]]],
+    from_npz: Callable[[pathlib.Path], list[tuple[str, Any]]],
+) -> list[tuple[str, Any]]:
+    """(label, numbers) of each row of a CSV or npz file.
+
+    Args:
+        field: what it is called. from_csv: reads a text, as :func:`csv_rows`. from_npz: reads a file of arrays.
+
+    Raises:
+        PathFileError: missing, unreadable, or without a row. UnknownNameError: another suffix. What the readers raise.
+    """
+    suffix = validation.one_of(field, file.suffix.lower(), (".csv", ".npz"))
+    try:
+        rows = from_csv(file.read_text(encoding="utf-8")) if suffix == ".csv" else from_npz(file)
+    except FileNotFoundError as error:
+        raise PathFileError(field, str(file), validation.no_such(file)) from error
+    except (OSError, EOFError, ValueError, zipfile.BadZipFile) as error:
+        raise PathFileError(field, str(file), f"cannot be read: {error}") from error
+    if not rows:
+        raise PathFileError(field, str(file), f"has no {field}")
+    return rows
 
 
 def csv_rows(

@@ -12,13 +12,12 @@ import numpy as np
 from wbc import validation
 from wbc.errors import RotationError, ShapeError, UnknownNameError
 from wbc.multibody import pin
-from wbc.track.path_file import PathFileError, csv_rows
+from wbc.track.path_file import csv_rows, rows_of
 
 POSITION = ("x", "y", "z")
 QUATERNION = ("qx", "qy", "qz", "qw")
 #: Arrays of a file, and the shapes that an element may have
 ARRAYS: dict[str, tuple[tuple[int, ...], ...]] = {"poses": ((7,), (4, 4)), "positions": ((3,),)}
-TARGET_SUFFIXES = (".csv", ".npz")
 
 #: Files are written with few digits: what is a unit quaternion to this becomes one
 ROUNDED = 1e-3
@@ -42,18 +41,7 @@ def read_targets(file: Path) -> list[Target]:
         PathFileError: missing, unreadable, or without a target. UnknownNameError: a suffix or name that does not belong
             there. ShapeError, NotFiniteError, RotationError: a value; its line or row is named.
     """
-    validation.one_of("targets", file.suffix.lower(), TARGET_SUFFIXES)
-    try:
-        if file.suffix.lower() == ".csv":
-            rows = csv_rows(file, file.read_text(encoding="utf-8"), POSITION, QUATERNION, ("t",))
-        else:
-            rows = _from_npz(file)
-    except FileNotFoundError as error:
-        raise PathFileError("targets", str(file), validation.no_such(file)) from error
-    except (OSError, EOFError, ValueError, zipfile.BadZipFile) as error:
-        raise PathFileError("targets", str(file), f"cannot be read: {error}") from error
-    if not rows:
-        raise PathFileError("targets", str(file), "has no target")
+    rows = rows_of("targets", file, lambda text: csv_rows(file, text, POSITION, QUATERNION, ("t",)), _from_npz)
     return [as_target(f"{file.name} {label}", given) for label, given in rows]
 
 

@@ -11,12 +11,11 @@ from typing import Any
 import numpy as np
 
 from wbc.climb.along import AlongOptions, BodyTrack, plan_along
-from wbc.climb.aside import RESTS, PlanAside
 from wbc.climb.climber import Climber
 from wbc.climb.drive import ClimbDrive, standing_plan
 from wbc.climb.first import first_stance
 from wbc.climb.goal import BodyPlace
-from wbc.climb.loop import ClimbLoop, LoopOptions
+from wbc.climb.loop import ClimbLoop
 from wbc.climb.places import body_over, surface_frames
 from wbc.climb.plan import ContactMove, ContactPlan
 from wbc.climb.planning import ClimbOptions, plan_climb
@@ -25,7 +24,6 @@ from wbc.climb.scene import ClimbScene, size_of
 from wbc.climb.search import NoStancesError
 from wbc.climb.session import climber_of, scene_of
 from wbc.climb.stance import FREE_LIMB, Stance
-from wbc.climb.steering import SurfaceSteering
 from wbc.multibody import pin
 from wbc.symbolic.kinematics import frame_index
 from wbc.validation import Array
@@ -34,7 +32,9 @@ from wbc.viewer.messages import RATE_LASTS, MessageError
 from wbc.viewer.one_limb import OneLimb
 from wbc.viewer.operation import Operation
 from wbc.viewer.paced import ticks
+from wbc.viewer.plan_aside import RESTS, PlanAside
 from wbc.viewer.scenery import checked
+from wbc.viewer.steering import SurfaceSteering
 from wbc.viewer.walks import scenery_of
 
 #: Speed of the body at full stick, as a share of the shortest limb's reach a second [1/s]
@@ -76,7 +76,7 @@ class WalkOperation(Operation):
         self._aside, self._now = PlanAside(climber), now
         self.loop = ClimbLoop(
             standing_plan(climber, scene, stance, RESTS), replan=self._aside.plan, onward=self._aside.plan,
-            options=LoopOptions(log=False), backend=backend,
+            log=False, backend=backend,
         )  # fmt: skip
         super().__init__(self.loop.controller)
         self.loop.place = self._place
@@ -260,10 +260,10 @@ class WalkOperation(Operation):
                 pass
         return plan_climb(self.climber, scene, stance, BodyPlace(end.translation), ClimbOptions())
 
-    def _place(self, scene: ClimbScene, stance: Stance, limb: str, foothold: str) -> ContactPlan:
+    def _place(self, scene: ClimbScene, stance: Stance, limb: str, footholds: list[str]) -> ContactPlan:
         """A limb goes to another foothold than its plan has."""
         with self._aside.lock:
-            return OneLimb(self.climber, limb, self.steering).to_foothold(scene, stance, foothold)
+            return OneLimb(self.climber, limb, self.steering).to_foothold(scene, stance, footholds[0])
 
     def _approve(self, move: ContactMove) -> str | None:
         """The answer to a lift, once there is one."""

@@ -12,9 +12,9 @@ from wbc.climb.limb_work import moved_by, plan_limb_work
 from wbc.climb.plan import ContactPlan
 from wbc.climb.scene import ClimbScene
 from wbc.climb.stance import FREE_LIMB, Stance
-from wbc.climb.steering import SurfaceSteering
 from wbc.errors import InfeasibleError, WbcError
 from wbc.validation import Array
+from wbc.viewer.steering import SurfaceSteering
 
 #: How far ahead a motion by rates is planned; where that is not clear, less is tried [s]
 LIMB_AHEAD = (1.5, 0.8, 0.4)

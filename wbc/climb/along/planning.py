@@ -14,7 +14,6 @@ from wbc.climb.along.body_track import BodyTrack
 from wbc.climb.along.search import AlongSearch, Standing
 from wbc.climb.clear import Clearances
 from wbc.climb.climber import Climber
-from wbc.climb.joint_values import joint_values, with_joint_values
 from wbc.climb.motion import MotionOptions
 from wbc.climb.plan import ContactMove, ContactPlan
 from wbc.climb.reach import LIMIT_MARGIN
@@ -25,6 +24,7 @@ from wbc.climb.time_law import cubics_need, fastest, law_knots
 from wbc.climb.world import ClimbWorld
 from wbc.errors import RangeError
 from wbc.multibody import pin
+from wbc.robot.joint_values import joint_values, with_joint_values
 from wbc.symbolic.kinematics import frame_index
 from wbc.validation import Array
 

@@ -1,10 +1,9 @@
-"""The check of a climb: time, joints and contacts; then clearances and cones."""
+"""The check of a climb: time, joints, contacts and what was asked of the body; then clearances and cones."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from wbc.climb.checker.asked import check_body, check_presence
 from wbc.climb.checker.clearances import check_clearances
 from wbc.climb.checker.cones import check_cones
 from wbc.climb.checker.record import OPEN, Climbed
@@ -17,6 +16,14 @@ from wbc.multibody import pin
 
 #: Relative change of a period that is rounding
 ROUNDING = 1e-6
+#: Time over which rates of the body are means [s]
+MEAN = 0.1
+#: By how much such a mean may be above what was asked [m/s]
+FASTER = 0.01
+#: The same of the turn rate [rad/s]: 1 deg/s
+TURNS_FASTER = float(np.deg2rad(1.0))
+#: Rounding of times [s]
+INSTANT = 1e-9
 
 
 def check(log: Log, climber: Climber, scene: ClimbScene, rules: CheckRules | None = None) -> ClimbReport:
@@ -24,9 +31,9 @@ def check(log: Log, climber: Climber, scene: ClimbScene, rules: CheckRules | Non
 
     Joints are within their limits of position, and of rate and acceleration as means over ``rules.window``; closed
     contacts are at footholds that their limbs may hold, one each, that have not vanished, and still; the body goes as
-    it was asked to (:mod:`wbc.climb.checker.asked`); links keep clear of bodies and of each
-    other at every tick (by Coal) and between them (:mod:`wbc.climb.checker.clearances`); and the contacts can bear the
-    robot (:mod:`wbc.climb.checker.cones`), or do as logged.
+    it was asked to; links keep clear of bodies and of each other at every tick (by Coal) and between them
+    (:mod:`wbc.climb.checker.clearances`); and the contacts can bear the robot (:mod:`wbc.climb.checker.cones`), or do
+    as logged.
 
     Args:
         log: of :class:`wbc.climb.loop.ClimbLoop`. climber: the robot. scene: what it climbed. rules: default:
@@ -44,8 +51,8 @@ def check(log: Log, climber: Climber, scene: ClimbScene, rules: CheckRules | Non
     _check_time(climbed, float(log.meta.get("period", np.median(np.diff(climbed.t)))), tally)
     _check_joints(climbed, rules, tally)
     _check_contacts(climbed, rules, tally)
-    check_presence(climbed, tally)
-    check_body(climbed, rules, tally)
+    _check_presence(climbed, tally)
+    _check_body(climbed, rules, tally)
     check_clearances(climbed, rules, tally)
     check_cones(climbed, rules, tally)
     return tally.report()
@@ -115,3 +122,39 @@ def _check_contacts(climbed: Climbed, rules: CheckRules, tally: RuleTally) -> No
         closed = contacts[contacts != OPEN]
         shared = len(closed) - len(np.unique(closed))
         tally.add("foothold that is another's", np.array([float(shared)]), climbed.t[k : k + 1], "two limbs on one")
+
+
+def _check_body(climbed: Climbed, rules: CheckRules, tally: RuleTally) -> None:
+    """Means of the body's speed and turn rate, and jumps of its velocity from tick to tick, from rest on."""
+    twists, t = climbed.body, climbed.t
+    count = max(1, min(round(MEAN / float(np.median(np.diff(t)))), len(twists)))
+    for part, unit, name, most, more, jump in (
+        (slice(0, 3), "m/s", "speed", rules.speed, FASTER, rules.jump),
+        (slice(3, 6), "rad/s", "turn rate", rules.turn_rate, TURNS_FASTER, rules.jump_turn),
+    ):
+        sizes = np.linalg.norm(twists[:, part], axis=1)
+        if most is not None:
+            tally.declare(f"body's {name}", most + more, unit)
+            passed = np.concatenate([[0.0], np.cumsum(sizes * np.diff(t))])
+            tally.add(
+                f"body's {name}", (passed[count:] - passed[:-count]) / (t[count:] - t[:-count]), t[count:], "body"
+            )
+        if jump is not None:
+            tally.declare(f"jump of the body's {name}", jump, unit)
+            jumps = np.linalg.norm(np.diff(np.vstack([np.zeros(3), twists[:, part]]), axis=0), axis=1)
+            tally.add(f"jump of the body's {name}", jumps, t[1:], "body")
+
+
+def _check_presence(climbed: Climbed, tally: RuleTally) -> None:
+    """No limb holds a foothold after it vanished."""
+    rule = "held after it vanished"
+    if len(climbed.presence):
+        tally.declare(rule, INSTANT, "s")
+    for row in np.unique(climbed.presence[:, 0]).astype(int).tolist():
+        changes = climbed.presence[climbed.presence[:, 0] == row]
+        latest = np.searchsorted(changes[:, 1], climbed.t - INSTANT, side="right") - 1
+        gone = (latest >= 0) & (changes[latest, 2] == 0.0)
+        for k, limb in enumerate(climbed.climber.limbs):
+            ticks = gone & (climbed.contacts[:, k] == row)
+            since = climbed.t[ticks] - changes[latest[ticks], 1]
+            tally.add(rule, since, climbed.t[ticks], f"{limb.name} on {climbed.scene.footholds[row].id}")

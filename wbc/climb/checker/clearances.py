@@ -1,21 +1,20 @@
-"""Clearances of links: exact at every tick by Coal, and proven between ticks.
+"""Clearances of links: exact at ticks by Coal, and proven between them.
 
 Between two ticks q goes along the shortest way. Every point of a link then moves by at most
 
     s = |d_lin| + |d_ang| R_0 + sum_j |d_j| R_j         d = q_{k+1} (-) q_k, j: joints that carry the link
 
-R_j: the farthest that a point of the link can be from the axis of joint j. So the distance of two bodies between the
-ticks is at least (a + b - s) / 2 with a and b at the ticks; where that proves too little, the way is halved.
+R_j: the farthest that a point of the link can be from the axis of joint j. So the distance of two bodies on a stretch
+of the climb is at least (a + b - sum of s) / 2 with a and b at its ends; where that proves too little, it is halved.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 
 import numpy as np
-from numpy.typing import NDArray
 
 # isort: split
 from wbc.multibody import pin
@@ -42,6 +41,9 @@ from wbc.shapes import (
 )
 from wbc.validation import Array
 
+BODIES = "clearance of bodies"
+LINKS = "clearance of links"
+POINTS = "contact's point in a body"
 #: Distance beyond which nothing is measured [m]
 FAR = 0.05
 #: How far from a foothold, beside what closed contacts may be, a limb in the air counts as on it [m]
@@ -71,7 +73,6 @@ class _SweptPart:
     Attributes:
         name: of its link or body. joint: that carries it. shape: what it is.
         solid: Coal's own of it, None of the inside of a cylinder. pose: on the joint.
-        center, radius: of a ball round it, on the joint [m].
         reaches: R_j by velocity coordinate, and R_0 for those of the base's rotation [m].
     """
 
@@ -80,8 +81,6 @@ class _SweptPart:
     shape: Geometry
     solid: coal.CollisionGeometry | None
     pose: pin.SE3
-    center: Array
-    radius: float
     reaches: Array
 
 
@@ -92,48 +91,76 @@ def check_clearances(climbed: Climbed, rules: CheckRules, tally: RuleTally) -> N
     from there and to there; the contact's point itself stays out of every body. What a closed contact holds is for the
     rules of contacts to judge.
     """
-    tally.declare("clearance of bodies", rules.clearance - rules.swept, "m", least=True)
-    tally.declare("clearance of links", rules.clearance - rules.swept, "m", least=True)
-    tally.declare("contact's point in a body", -rules.depth - rules.swept, "m", least=True)
+    for rule, least in ((BODIES, rules.clearance), (LINKS, rules.clearance), (POINTS, -rules.depth)):
+        tally.declare(rule, least - rules.swept, "m", least=True)
     climber, robot = climbed.climber, climbed.climber.robot
     model = robot.model
     links = [part for name, shapes in robot.shapes.items() for part in _parts(model, name, shapes)]
     bodies = [_part(model, name, body, 0) for name, body in climbed.scene.bodies.items()]
-    points = []
-    for limb in climber.limbs:
-        frame = model.frames[model.getFrameId(limb.frame)]
+    frames = [model.frames[model.getFrameId(limb.frame)] for limb in climber.limbs]
+    points = list[_SweptPart]()
+    for limb, frame in zip(climber.limbs, frames, strict=True):
         ball = PlacedShape(Sphere(POINT), frame.placement * limb.placement)
         points.append(_part(model, limb.name, ball, int(frame.parentJoint)))
     around = _PairDistances(climbed, rules)
+
+    def look(
+        rule: str,
+        a: _SweptPart,
+        b: _SweptPart,
+        limbs: Sequence[int] = (),
+        lowered: Callable[[int], float] | None = None,
+    ) -> None:
+        """With the tips of some limbs, which may hold the other part."""
+        least = -rules.depth if rule == POINTS else rules.clearance
+        value, tick = around.room(a, b, _holding(climbed, limbs, b, least), lowered)
+        tally.add(rule, np.array([value + least]), climbed.t[[tick]], f"{a.name} and {b.name}")
+
     for body in bodies:
         for link in links:
-            floor = _floor(climbed, around, link, body, rules)
-            values = around.room(link, body, floor) + rules.clearance
-            tally.add("clearance of bodies", values, climbed.t, f"{link.name} and {body.name}")
+            tips = [k for k, frame in enumerate(frames) if int(frame.parentJoint) == link.joint]
+            look(BODIES, link, body, tips, _near_footholds(climbed, around, (link, body), tips, rules))
         for k, point in enumerate(points):
-            values = around.room(point, body, _outside(climbed, k, body, rules)) - rules.depth
-            tally.add("contact's point in a body", values, climbed.t, f"{point.name} and {body.name}")
+            look(POINTS, point, body, [k])
     pairs = None if robot.self_pairs is None else {frozenset(pair) for pair in robot.self_pairs}
-    needed = np.full(len(climbed.t), rules.clearance)
     for a, b in combinations(links, 2):
         if frozenset((a.name, b.name)) in pairs if pairs is not None else _apart(model, around, a, b):
-            values = around.room(a, b, needed) + rules.clearance
-            tally.add("clearance of links", values, climbed.t, f"{a.name} and {b.name}")
+            look(LINKS, a, b)
 
 
-def _floor(climbed: Climbed, around: _PairDistances, link: _SweptPart, body: _SweptPart, rules: CheckRules) -> Array:
-    """Least distance that is allowed of a pair at every tick; ``HOLDING`` while a limb whose tip this link is holds."""
-    model, floor = climbed.climber.robot.model, np.full(len(climbed.t), rules.clearance)
-    for k, limb in enumerate(climbed.climber.limbs):
-        if int(model.frames[model.getFrameId(limb.frame)].parentJoint) != link.joint:
-            continue
-        for first, last, row in climbed.stretches(k):
+def _holding(climbed: Climbed, limbs: Sequence[int], body: _SweptPart, least: float) -> Array:
+    """Least distance that is allowed at every tick: any while one of some limbs holds something on the body."""
+    out = np.full(len(climbed.t), least)
+    for limb in limbs:
+        for first, last, row in climbed.stretches(limb):
             if row != OPEN and climbed.scene.footholds[row].on == body.name:
-                floor[first:last] = HOLDING
-        for row, first, last in _ways(climbed, k):
-            if climbed.scene.footholds[row].on == body.name:
-                _lower_near(climbed, around, (link, body, k), (row, first, last), floor, rules)
-    return floor
+                out[first:last] = HOLDING
+    return out
+
+
+def _near_footholds(
+    climbed: Climbed, around: _PairDistances, pair: tuple[_SweptPart, _SweptPart], limbs: list[int], rules: CheckRules
+) -> Callable[[int], float]:
+    """Over a foothold of its way a limb in the air may be as deep as it would be there, less half of its distance from
+    where closed contacts may be; its contact's point is out of the body all the same.
+    """
+    ways = list[tuple[int, int, int, pin.SE3]]()
+    for limb in limbs:
+        for row, first, last in _ways(climbed, limb):
+            foothold = climbed.scene.footholds[row]
+            if foothold.on == pair[1].name:
+                ways.append((limb, first, last, climbed.climber.limbs[limb].contact.held_at(foothold.pose)))
+
+    def least(k: int) -> float:
+        out = rules.clearance
+        for limb, first, last, held in ways:
+            off = held.translation - climbed.tips[0][k, limb]
+            if first <= k < last and off @ held.rotation[:, 2] <= rules.depth:
+                beside = max(float(np.linalg.norm(off)) - ASIDE - rules.hold_distance, 0.0)
+                out = min(out, around.distance(*pair, k, off) + RISES * beside - rules.depth)
+        return out
+
+    return least
 
 
 def _ways(climbed: Climbed, limb: int) -> list[tuple[int, int, int]]:
@@ -157,139 +184,71 @@ def _ways(climbed: Climbed, limb: int) -> list[tuple[int, int, int]]:
     return sorted(set(out))
 
 
-def _lower_near(
-    climbed: Climbed,
-    around: _PairDistances,
-    what: tuple[_SweptPart, _SweptPart, int],
-    way: tuple[int, int, int],
-    floor: Array,
-    rules: CheckRules,
-) -> None:
-    """Over a foothold of its way a limb in the air may be as deep as it would be there, less half of its distance from
-    where closed contacts may be; its contact's point is out of the body all the same.
-    """
-    link, body, limb = what
-    row, first, last = way
-    held = climbed.climber.limbs[limb].contact.held_at(climbed.scene.footholds[row].pose)
-    offs, normal = held.translation - climbed.tips[0][first:last, limb], held.rotation[:, 2]
-    beside = ASIDE + rules.hold_distance
-    for k in around.nearer(link, body, first + np.flatnonzero(offs @ normal <= rules.depth), rules.clearance):
-        there = around.distance(link, body, k, offs[k - first])
-        lowest = there + RISES * max(float(np.linalg.norm(offs[k - first])) - beside, 0.0) - rules.depth
-        floor[k] = min(floor[k], lowest)
-
-
-def _outside(climbed: Climbed, limb: int, body: _SweptPart, rules: CheckRules) -> Array:
-    """The same for the point of a limb's contact."""
-    floor = np.full(len(climbed.t), -rules.depth)
-    for first, last, row in climbed.stretches(limb):
-        if row != OPEN and climbed.scene.footholds[row].on == body.name:
-            floor[first:last] = HOLDING
-    return floor
-
-
 class _PairDistances:
     """Distances of pairs over a climb."""
 
     def __init__(self, climbed: Climbed, rules: CheckRules) -> None:
-        self._known: dict[tuple[int, int, int], float] = {}
-        self._balls: dict[int, tuple[Array, Array]] = {}
-        self._climbed, self._tolerance, model = climbed, rules.swept, climbed.climber.robot.model
-        self._model, self._data = model, model.createData()
-        self._poses = np.zeros((len(climbed.t), model.njoints, 3, 4))
-        for k, q in enumerate(climbed.q):
-            pin.forwardKinematics(model, self._data, q)
-            for joint, pose in enumerate(self._data.oMi):
-                self._poses[k, joint, :, :3], self._poses[k, joint, :, 3] = pose.rotation, pose.translation
-        moved = np.abs(climbed.moved)
-        base = np.column_stack([np.linalg.norm(moved[:, :3], axis=1), np.linalg.norm(moved[:, 3:6], axis=1)])
-        self._moved = np.hstack([base[:, :1], np.zeros((len(moved), 2)), base[:, 1:], np.zeros((len(moved), 2)),
-                                 moved[:, 6:]])  # fmt: skip
+        self._climbed, self._tolerance, self._model = climbed, rules.swept, climbed.climber.robot.model
+        self._data, moved = self._model.createData(), np.abs(climbed.moved)
+        self._known: dict[tuple[_SweptPart, _SweptPart, float], float] = {}
+        self._poses: dict[float, list[pin.SE3]] = {}
+        base = [np.linalg.norm(moved[:, k : k + 3], axis=1) for k in (0, 3)]
+        self._moved = moved
+        moved[:, :6] = 0.0
+        moved[:, 0], moved[:, 3] = base
 
-    def distance(self, a: _SweptPart, b: _SweptPart, k: int, moved: Array | None = None) -> float:
-        """Of two parts at a tick, the first one moved or not [m]."""
-        key = id(a), id(b), k
+    def distance(self, a: _SweptPart, b: _SweptPart, x: float, moved: Array | None = None) -> float:
+        """Of two parts at a tick or between two, the first one moved or not [m]."""
+        key = a, b, x
         if moved is None and key in self._known:
             return self._known[key]
-        first, other = (pin.SE3(self._poses[k, p.joint, :, :3], self._poses[k, p.joint, :, 3]) for p in (a, b))
+        if x not in self._poses:
+            k = int(x)
+            q = self._climbed.q[k]
+            q = q if x == k else pin.integrate(self._model, q, (x - k) * self._climbed.moved[k])
+            pin.forwardKinematics(self._model, self._data, q)
+            self._poses[x] = [pose.copy() for pose in self._data.oMi]
+        first, other = self._poses[x][a.joint], self._poses[x][b.joint]
         if moved is not None:
-            first.translation = first.translation + moved
-            return self._between(a, b, first, other)
+            return self._between(a, b, pin.SE3(first.rotation, first.translation + moved), other)
         self._known[key] = self._between(a, b, first, other)
         return self._known[key]
 
-    def nearer(self, a: _SweptPart, b: _SweptPart, ticks: NDArray[np.intp], distance: float) -> list[int]:
-        """Those of some ticks at which two parts are nearer to each other than so much [m]."""
-        passed, known, out = np.append(0.0, np.cumsum(self._ball(a)[1] + self._ball(b)[1])), -np.inf, list[int]()
-        for k in ticks.tolist():
-            # What was measured, less the way since
-            if known - passed[k] < distance:
-                known = self.distance(a, b, k) + passed[k]
-                out += [k] if known - passed[k] < distance else []
-        return out
+    def room(
+        self, a: _SweptPart, b: _SweptPart, floor: Array, lowered: Callable[[int], float] | None
+    ) -> tuple[float, int]:
+        """How far above ``floor`` ``(n)`` the distance is at least, and at which tick: proven to be, within the rule's
+        tolerance, where that is above 0; counted up to ``FAR`` [m].
 
-    def room(self, a: _SweptPart, b: _SweptPart, floor: Array) -> Array:
-        """How far above ``floor`` ``(n)`` the distance is, from each tick to the next one: proven to be, within the
-        rule's tolerance, where that is above 0; counted up to ``FAR`` [m].
+        Args:
+            lowered: lower floor of a tick, asked where it counts; None: there is none.
         """
-        # Balls round both leave most ticks without a measurement
-        (there, ways), (here, own) = self._ball(b), self._ball(a)
-        apart = np.linalg.norm(here - there, axis=1) - a.radius - b.radius
-        travel = own + ways
-        if apart.min() > FAR + floor.max() + travel.max():
-            return np.full(len(floor), FAR)
-        near = apart < FAR + floor + np.append(travel, 0.0)
-        near[1:] |= near[:-1].copy()
-        values = apart - floor
-        passed, least, known = np.concatenate([[0.0], np.cumsum(travel)]), FAR, -np.inf
-        for k in np.flatnonzero(near).tolist():
-            # What was measured, less the way since: ticks and ways that it leaves above the least one are not the worst
-            values[k] = known - passed[k] - floor[k]
-            if values[k] + passed[k] - passed[min(k + 1, len(travel))] <= least:
-                values[k] = self.distance(a, b, k) - floor[k]
-                known, least = values[k] + floor[k] + passed[k], min(least, values[k])
-        out = np.minimum(values, FAR)
-        step = np.minimum(floor[:-1], floor[1:]) - floor[:-1]
-        proven = (values[:-1] + values[1:] + floor[1:] - floor[:-1] - travel) / 2.0 - step
-        least = np.minimum(values[:-1], values[1:])
-        out[:-1] = np.where(least < -self._tolerance, out[:-1], np.minimum(out[:-1], proven))
-        for k in np.flatnonzero((proven < 0.0) & (least >= -self._tolerance)).tolist():
-            low = min(floor[k], floor[k + 1])
-            ends = values[k] + floor[k] - low, values[k + 1] + floor[k + 1] - low
-            out[k] = self._halved((a, b), k, (0.0, 1.0), ends, travel[k], low)
-        return np.asarray(out)
-
-    def _ball(self, part: _SweptPart) -> tuple[Array, Array]:
-        """Centre of the ball round a part at every tick ``(n, 3)``, and the way of its points between ticks
-        ``(n - 1)`` at most [m].
-        """
-        if id(part) not in self._balls:
-            poses = self._poses[:, part.joint]
-            self._balls[id(part)] = poses[:, :, :3] @ part.center + poses[:, :, 3], self._moved @ part.reaches
-        return self._balls[id(part)]
-
-    def _halved(
-        self,
-        pair: tuple[_SweptPart, _SweptPart],
-        k: int,
-        ends: tuple[float, float],
-        values: tuple[float, float],
-        travel: float,
-        floor: float,
-    ) -> float:
-        """The room on a part of the way between two ticks: proven, or found to be none."""
-        bound = (values[0] + values[1] - travel) / 2.0
-        if bound >= -self._tolerance or min(values) < -self._tolerance or ends[1] - ends[0] < SHORTEST:
-            return min(bound, *values)
-        middle = (ends[0] + ends[1]) / 2.0
-        pin.forwardKinematics(
-            self._model, self._data, pin.integrate(self._model, self._climbed.q[k], middle * self._climbed.moved[k])
-        )
-        value = self._between(*pair, *(self._data.oMi[part.joint] for part in pair)) - floor
-        return min(
-            self._halved(pair, k, (ends[0], middle), (values[0], value), travel / 2.0, floor),
-            self._halved(pair, k, (middle, ends[1]), (value, values[1]), travel / 2.0, floor),
-        )
+        travel = self._moved @ (a.reaches + b.reaches)
+        passed = np.append(0.0, np.cumsum(travel))
+        least, worst, stretches = FAR, 0, [(0.0, float(len(travel)))]
+        while stretches:
+            x, y = stretches.pop()
+            k, ends = int(x), (self.distance(a, b, x), self.distance(a, b, y))
+            if y - x > 1.0:
+                bound = 0.5 * (sum(ends) - passed[int(y)] + passed[k]) - floor[k : int(y) + 1].max()
+                if bound < least:
+                    middle = float((k + int(y)) // 2)
+                    stretches += [(middle, y), (x, middle)]
+                continue
+            bound = 0.5 * (sum(ends) - (y - x) * travel[k])
+            if bound - max(floor[k], floor[k + 1]) >= least:
+                continue
+            floors = [floor[j] if lowered is None else min(floor[j], lowered(j)) for j in (k, k + 1)]
+            low = min(floors)
+            # Between ticks the lower floor counts, at them their own
+            values = [end - (floors[int(z) - k] if z == int(z) else low) for z, end in zip((x, y), ends, strict=True)]
+            if bound - low < -self._tolerance <= min(ends) - low and y - x >= SHORTEST:
+                stretches += [(0.5 * (x + y), y), (x, 0.5 * (x + y))]
+            elif min(ends) - low >= -self._tolerance:
+                values.append(bound - low)
+            if min(values) < least:
+                least, worst = min(values), k
+        return least, worst
 
     def _between(self, a: _SweptPart, b: _SweptPart, at: pin.SE3, there: pin.SE3) -> float:
         if b.solid is None:
@@ -336,10 +295,8 @@ def _parts(model: pin.Model, link: str, shapes: tuple[PlacedShape, ...]) -> list
 
 
 def _part(model: pin.Model, name: str, placed: PlacedShape | SceneBody, joint: int) -> _SweptPart:
-    shape, radius = placed.shape, float(placed.shape.reach)
-    center = placed.placement * np.asarray(shape.center)
-    reaches = np.zeros(model.nv)
-    farthest, carrier = float(np.linalg.norm(center)) + radius, joint
+    shape, reaches, carrier = placed.shape, np.zeros(model.nv), joint
+    farthest = float(np.linalg.norm(placed.placement * np.asarray(shape.center))) + float(shape.reach)
     while carrier:
         start, count = int(model.idx_vs[carrier]), int(model.nvs[carrier])
         if count == 6:
@@ -354,7 +311,7 @@ def _part(model: pin.Model, name: str, placed: PlacedShape | SceneBody, joint: i
                 farthest += float(ends.max())
         farthest += float(np.linalg.norm(model.jointPlacements[carrier].translation))
         carrier = int(model.parents[carrier])
-    return _SweptPart(name, joint, shape, _coal_shape(shape), placed.placement, center, radius, reaches)
+    return _SweptPart(name, joint, shape, _coal_shape(shape), placed.placement, reaches)
 
 
 def _within(shape: Geometry, pose: pin.SE3, radius: float) -> float:

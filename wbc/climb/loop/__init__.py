@@ -9,7 +9,6 @@ from wbc import lazy
 if TYPE_CHECKING:
     from wbc.climb.loop.limb_state import TRANSITIONS as TRANSITIONS, Cause as Cause, LimbState as LimbState
     from wbc.climb.loop.loop import ClimbLoop as ClimbLoop, ClimbOutcome as ClimbOutcome, ClimbRun as ClimbRun
-    from wbc.climb.loop.options import LoopOptions as LoopOptions
     from wbc.climb.loop.reference import PlanReference as PlanReference
     from wbc.climb.loop.stack import FootholdContact as FootholdContact, climb_stack as climb_stack
 else:

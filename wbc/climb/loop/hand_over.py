@@ -11,8 +11,7 @@ from wbc.climb.loop.pace import STOPPING
 from wbc.climb.loop.reference import PlanReference
 from wbc.climb.plan import ContactMove
 
-#: Time in which one limb takes its load and another one gives up its own, of :attr:`LoopOptions.unload`, with the ticks
-#: between [1]
+#: Time in which one limb takes its load and another one gives up its own, of ``UNLOAD``, with the ticks between [1]
 HANDED = 2.2
 #: Least rate at which a plan goes on meanwhile [1]
 SLOWEST_HANDED = 0.1

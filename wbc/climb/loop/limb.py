@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import inf
 from typing import Any
 
 import numpy as np
 
+from wbc.api import Stack
 from wbc.climb.climber import ClimbLimb
 from wbc.climb.loop.limb_state import CLOSED, Cause, LimbState, after
-from wbc.climb.loop.options import LoopOptions
 from wbc.climb.loop.reference import PlanReference
 from wbc.climb.loop.stack import COMPONENTS, FootholdContact, contact_frame
 from wbc.climb.plan import ContactMove, ContactPlan
@@ -19,7 +18,6 @@ from wbc.climb.stance import FREE_LIMB
 from wbc.controller import core_of
 from wbc.controller.handle import InputGroup
 from wbc.multibody import pin
-from wbc.robot import Robot
 from wbc.simulation import GripKind, GrippingPlant
 from wbc.validation import Array
 
@@ -29,6 +27,16 @@ NEAR_LANDING = 0.1
 NEAR_BY_RATES = 1e-3
 #: The same by torques, which are not exact [m]
 NEAR_BY_TORQUES = 3e-3
+#: How far its z axis, or the pose where that is fixed, may be turned then [rad]
+NEAR_TURN = 0.02
+#: How long a plan waits for a limb that is late [s]
+WAITS = 1.0
+#: Time in which a limb hands over its load before it lifts, and takes it after it lands, by torques [s]
+UNLOAD = 0.08
+#: Speed at which a foot that is late goes on against its foothold's normal, by torques [m/s]
+PRESSES = 0.02
+#: Share of the coefficients of friction, and of soles, on which torques count [1]
+COUNTED = 0.75
 #: By torques, how much farther beside its foothold than that a foot may be as it closes [1]
 BESIDE = 2.5
 #: By torques, how much nearer to its surface than that a foot has to be [1]: below 1 mm its load hardly throws it
@@ -46,52 +54,37 @@ OPEN = 1.0
 INSTANT = 1e-9
 
 
-@dataclass(frozen=True, eq=False)
-class LoopParts:
-    """What all limbs of a loop share.
-
-    Attributes:
-        robot: with contact frames. stack, controller: of :func:`climb_stack`. options: of the loop.
-        plant: that grips; None: it does not. torques: whether torques are commanded. dt: period [s].
-    """
-
-    robot: Robot
-    stack: Any
-    controller: Any
-    options: LoopOptions
-    plant: GrippingPlant | None
-    torques: bool
-    dt: float
-
-
 class LimbMachine:
     """A limb's state as of :class:`LimbState`, and what a change of it means for stack and plant.
 
     Args:
-        limb: which. parts: of the loop.
+        limb: which. stack, controller: of :func:`climb_stack`. plant: that grips; None: it does not. torques: whether
+            torques are commanded.
 
     Attributes:
         item: its contact in the stack. state: now. held: row of the foothold that it is closed on, or ``FREE_LIMB``.
         frame: name of its contact frame. moves: those of the plan that are not over.
     """
 
-    def __init__(self, limb: ClimbLimb, parts: LoopParts) -> None:
-        self.name, self._kind, self._parts = limb.name, limb.contact, parts
-        self.frame = contact_frame(limb)
-        self._number = parts.robot.model.getFrameId(self.frame)
+    def __init__(
+        self, limb: ClimbLimb, stack: Stack, controller: Any, plant: GrippingPlant | None, torques: bool
+    ) -> None:
+        self.name, self._kind, self._plant, self._torques = limb.name, limb.contact, plant, torques
+        self.frame, self._model, self._dt = contact_frame(limb), stack.robot.model, stack.dt
+        self._number = self._model.getFrameId(self.frame)
         self._gripping, self._closed_at = False, (np.zeros(3), 0.0)
-        items = parts.controller
-        self._contact, self._swing = items[f"{self.name} contact"], items[f"{self.name} swing"]
-        self._force = items[f"{self.name} contact force"] if parts.torques else None
+        self._contact, self._swing = controller[f"{self.name} contact"], controller[f"{self.name} swing"]
+        self._force = controller[f"{self.name} contact force"] if torques else None
         self._bearing = 0.0 if self._force is None else self._force.weight
-        self.item: FootholdContact = parts.stack[f"{self.name} contact"].item
-        fields = ("target", "feedforward", *(["acceleration"] * parts.torques))
-        self._aim = InputGroup(core_of(items), [(f"{self.name} swing", field, None) for field in fields])
-        self._glide = InputGroup(core_of(items), [(f"{self.name} contact", "feedforward", None)])
-        self._loading, near = (parts.options.unload if parts.torques else 0.0), parts.options.latch_distance
-        self._presses = parts.torques and not limb.contact.pulls
-        self._near = (NEAR_BY_TORQUES if parts.torques else NEAR_BY_RATES) if near is None else near
-        self._data = parts.robot.model.createData()
+        item: Any = stack[f"{self.name} contact"].item
+        self.item: FootholdContact = item
+        fields = ("target", "feedforward", *(["acceleration"] * torques))
+        self._aim = InputGroup(core_of(controller), [(f"{self.name} swing", field, None) for field in fields])
+        self._glide = InputGroup(core_of(controller), [(f"{self.name} contact", "feedforward", None)])
+        self._loading = UNLOAD if torques else 0.0
+        self._presses = torques and not limb.contact.pulls
+        self._near = NEAR_BY_TORQUES if torques else NEAR_BY_RATES
+        self._data = self._model.createData()
         self.state, self.held, self._since = LimbState.FREE, FREE_LIMB, 0.0
         self._late, self.moves, self._target = 0.0, list[ContactMove](), pin.SE3.Identity()
         self._footholds: tuple[Foothold, ...] = ()
@@ -109,8 +102,7 @@ class LimbMachine:
         """Closed from the beginning; what keeps it from there, "" for nothing."""
         self._target = self._at(foothold, 0.0)
         off, turned = self.off(q)
-        options = self._parts.options
-        if off > 10.0 * self._near or turned > 10.0 * options.latch_angle:
+        if off > 10.0 * self._near or turned > 10.0 * NEAR_TURN:
             return f"{self.name} is {off:.3g} m and {turned:.3g} rad off {self._footholds[foothold].id}"
         self.state, self._since = LimbState.HELD, now
         self._close(foothold, q)
@@ -197,18 +189,18 @@ class LimbMachine:
         move = self.coming
         if self.state is not LimbState.REACHING or move is None or path_time < move.land - INSTANT:
             return False
-        self._late += self._parts.dt
+        self._late += self._dt
         return True
 
     def too_late(self, q: Array) -> str:
         """What keeps it from its foothold for longer than is waited, in words; "" for nothing."""
-        options, move = self._parts.options, self.coming
-        if self._late <= options.patience or move is None:
+        move = self.coming
+        if self._late <= WAITS or move is None:
             return ""
         off, turned = self.off(q)
         return (
             f"{self.name} did not come to {self._footholds[move.lands].id}: {1e3 * off:.2f} mm and {turned:.3f} rad "
-            f"off after {options.patience:g} s; {1e3 * self._near:g} mm and {options.latch_angle:g} rad are allowed"
+            f"off after {WAITS:g} s; {1e3 * self._near:g} mm and {NEAR_TURN:g} rad are allowed"
         )
 
     def change(self, cause: Cause, q: Array, now: float) -> LimbState:
@@ -242,24 +234,23 @@ class LimbMachine:
         Args:
             planned: with the kinematics of the plan now, and of its velocity over the tick.
         """
-        parts, model = self._parts, self._parts.robot.model
-        rate = pin.getFrameVelocity(model, planned, self._number, pin.LOCAL_WORLD_ALIGNED).vector
+        rate = pin.getFrameVelocity(self._model, planned, self._number, pin.LOCAL_WORLD_ALIGNED).vector
         if self.held != FREE_LIMB:
             self._glide.write(rate)
             return
-        now = pin.updateFramePlacement(model, planned, self._number)
+        now = pin.updateFramePlacement(self._model, planned, self._number)
         place = now.translation
         if self._late > 0.0 and self._presses:
-            normal, press = self._target.rotation[:, 2], parts.options.press
-            place, rate[:3] = place - press * self._late * normal, rate[:3] - press * normal
+            normal = self._target.rotation[:, 2]
+            place, rate[:3] = place - PRESSES * self._late * normal, rate[:3] - PRESSES * normal
         aim = [place]
         if self._kind.fixed == "position":
             rate = rate[:3]
         else:
             aim = [now.rotation.T.ravel(), place]
         aim.append(rate)
-        if parts.torques:
-            aim.append((rate - self._rate) / parts.dt)
+        if self._torques:
+            aim.append((rate - self._rate) / self._dt)
             self._rate = rate
         self._aim.write(np.concatenate(aim))
 
@@ -286,7 +277,7 @@ class LimbMachine:
         """
         if not self._gripping:
             return 0.0
-        place = pin.updateFramePlacement(self._parts.robot.model, seen, self._number).translation
+        place = pin.updateFramePlacement(self._model, seen, self._number).translation
         first, off = self._closed_at
         nearer = max(off - float(np.linalg.norm(place - self._target.translation)), 0.0)
         return float(np.linalg.norm(place - first)) - nearer
@@ -297,9 +288,8 @@ class LimbMachine:
         Args:
             seen: with the joints' Jacobians of where the robot is.
         """
-        model, kind = self._parts.robot.model, self._kind
-        rows = pin.getFrameJacobian(model, seen, self._number, pin.ReferenceFrame.LOCAL)
-        return np.asarray(rows[list(COMPONENTS[kind.fixed])])
+        rows = pin.getFrameJacobian(self._model, seen, self._number, pin.ReferenceFrame.LOCAL)
+        return np.asarray(rows[list(COMPONENTS[self._kind.fixed])])
 
     def _there(self, q: Array) -> bool:
         """Whether it is near enough to its foothold to close; a foot that touches, also a little beside it."""
@@ -308,7 +298,7 @@ class LimbMachine:
             away = self._target.actInv(self._pose(q)).translation
             above = ABOVE if self._late < STANDS_LATE else 1.0
             off = max(above * float(away[2]), -float(away[2]), float(np.hypot(away[0], away[1])) / BESIDE)
-        return off <= self._near and turned <= self._parts.options.latch_angle
+        return off <= self._near and turned <= NEAR_TURN
 
     def _close(self, foothold: int, q: Array) -> None:
         """Its rows are hard."""
@@ -318,7 +308,7 @@ class LimbMachine:
                 # Where the foot is, which may be a little beside the plan's foothold
                 above = float(target.rotation[:, 2] @ (self._pose(q).translation - target.translation))
                 target = self._stood(q, max(0.0, above + SENT_BELOW) if self.state is LimbState.LATCHING else 0.0)
-            slopes, bounds = self.item.numbers(self._footholds[foothold].friction, self._parts.options.friction)
+            slopes, bounds = self.item.numbers(self._footholds[foothold].friction, COUNTED)
             inputs = {"slopes": slopes, "bounds": bounds}
             if self.state is LimbState.LATCHING:
                 # It has no load yet: a force that nothing answers would throw the limb at what it is to hold
@@ -326,8 +316,8 @@ class LimbMachine:
             self._force.ramp(self._bearing, self._loading)
         self._contact.set(target=target, **inputs)
         self._contact.enabled, self._swing.enabled = True, False
-        if self._parts.plant is not None and self._kind.pulls:
-            self._parts.plant.grasp(self.frame, target, GripKind(self._kind.fixed))
+        if self._plant is not None and self._kind.pulls:
+            self._plant.grasp(self.frame, target, GripKind(self._kind.fixed))
             place, self._gripping = self._pose(q).translation, True
             self._closed_at = place, float(np.linalg.norm(place - target.translation))
         self.held, self._late = foothold, 0.0
@@ -343,8 +333,8 @@ class LimbMachine:
         self._contact.enabled, self._swing.enabled = False, True
         if self._force is not None:
             self._force.weight = OPEN
-        if self._parts.plant is not None and self._gripping:
-            self._parts.plant.release(self.frame)
+        if self._plant is not None and self._gripping:
+            self._plant.release(self.frame)
         self._gripping = False
         self.held, self._late = FREE_LIMB, 0.0
         self._rate = np.zeros(3 if self._kind.fixed == "position" else 6)
@@ -361,6 +351,5 @@ class LimbMachine:
 
     def _pose(self, q: Array) -> pin.SE3:
         """Of the contact frame."""
-        model = self._parts.robot.model
-        pin.forwardKinematics(model, self._data, q)
-        return pin.updateFramePlacement(model, self._data, self._number).copy()
+        pin.forwardKinematics(self._model, self._data, q)
+        return pin.updateFramePlacement(self._model, self._data, self._number).copy()

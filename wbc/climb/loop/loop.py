@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import partial
@@ -15,13 +15,12 @@ import numpy as np
 
 from wbc import validation
 from wbc.climb.bearing import check_borne
-from wbc.climb.climber import Climber
+from wbc.climb.limb_work import plan_limb_work
 from wbc.climb.loop.ahead import StateAhead
 from wbc.climb.loop.hand_over import HandOvers
-from wbc.climb.loop.limb import LimbMachine, LoopParts
+from wbc.climb.loop.limb import UNLOAD, WAITS, LimbMachine
 from wbc.climb.loop.limb_state import CLOSED, Cause, LimbState
 from wbc.climb.loop.motor_watch import FeltPlant, MotorWatch
-from wbc.climb.loop.options import PERIODS, LoopOptions
 from wbc.climb.loop.pace import PlanPace
 from wbc.climb.loop.records import WRENCH, ClimbRecorder
 from wbc.climb.loop.reference import PlanReference
@@ -44,8 +43,10 @@ Replan = Callable[[ClimbScene, Stance], ContactPlan]
 Onward = Callable[[ClimbScene, Stance], ContactPlan | None]
 #: Whether a limb may lift: "" for yes, the id of another foothold that it is to go to, None for not yet
 Approve = Callable[[ContactMove], str | None]
-#: A plan of one limb, by name, to a foothold, by id, from where the robot stands
-Placed = Callable[[ClimbScene, Stance, str, str], ContactPlan]
+#: A plan of one limb, by name, to footholds, by id, from where the robot stands
+Placed = Callable[[ClimbScene, Stance, str, list[str]], ContactPlan]
+#: Periods of loops of velocities and of torques [s]
+PERIODS = {CommandKind.VELOCITY: 0.01, CommandKind.TORQUE: 0.002}
 #: How far the body may be from the plan, by torques, before that slows down: from half of this on [m]
 LAG = 8e-3
 #: Least rate at which a plan goes on for a body that is off it [1]
@@ -56,6 +57,8 @@ ARRIVED = 0.5
 STILL = 5e-3
 #: Gain of all that follows the plan by velocities, and of closed contacts, times the period
 FOLLOWING = 0.2
+#: omega of a = a_ref + 2 omega (v_ref - v) + omega^2 (q_ref - q), by torques [1/s]
+BANDWIDTH = 30.0
 #: How far a grip may go from where it closed before it counts as slipping [m]
 SLIPS = 1e-3
 #: Singular value of closed limbs' rows, of metres and radians, below which they leave the body free
@@ -124,7 +127,9 @@ class ClimbLoop:
     Args:
         plan: what is carried out, from its first configuration. plant: default: the kinematic one.
         replan: the planner; None: where one is needed the run ends, and says so. onward: what comes after a plan that
-            is done; None: nothing does. options: see there.
+            is done; None: nothing does.
+        period: of a tick [s]; None: 0.01 for velocities, 0.002 for torques. delay: of the torques, which the loop
+            knows [s]. log: whether ticks are logged; without, the log has the start alone.
         backend: as of ``Stack.compile``.
 
     Attributes:
@@ -137,7 +142,7 @@ class ClimbLoop:
 
     Raises:
         ShapeError, RangeError: a plan that is none, or that motors and contacts do not bear at rest under torques; a
-            plant that does not fit.
+            plant that does not fit; a period or delay that is none.
     """
 
     def __init__(
@@ -147,46 +152,46 @@ class ClimbLoop:
         *,
         replan: Replan | None = None,
         onward: Onward | None = None,
-        options: LoopOptions | None = None,
+        period: float | None = None,
+        delay: float = 0.0,
+        log: bool = True,
         backend: str = "auto",
     ) -> None:
-        options, self._replan, self._onward = options or LoopOptions(), replan, onward
+        self._replan, self._onward = replan, onward
         kinds = (CommandKind.VELOCITY,) if plant is None else tuple(plant.commands)
         self._torques = CommandKind.VELOCITY not in kinds and CommandKind.TORQUE in kinds
         kind = CommandKind.TORQUE if self._torques else CommandKind.VELOCITY
-        self.dt = options.period or PERIODS[kind]
+        self.dt = PERIODS[kind] if period is None else period
         self._check(plan)
         self._connection = Connection(plant, plan.climber.robot, self.dt, kind)
         stack = climb_stack(plan.climber, plan.scene.gravity, self.dt, kind)
         command: Any = str(kind)
         self.robot, self.controller = stack.robot, stack.compile(command=command, backend=backend)
         self._grips: GrippingPlant | None = plant if isinstance(plant, GrippingPlant) else None
-        parts = LoopParts(self.robot, stack, self.controller, options, self._grips, self._torques, self.dt)
-        self._limbs = [LimbMachine(limb, parts) for limb in plan.climber.limbs]
-        self._set_gains(options)
+        given = stack, self.controller, self._grips, self._torques
+        self._limbs = [LimbMachine(limb, *given) for limb in plan.climber.limbs]
+        self._set_gains()
         fields = ("target", "feedforward", *(["acceleration"] * self._torques))
         self._follow = InputGroup(core_of(self.controller), [("reference", field, None) for field in fields])
         self._planned, self._seen = self.robot.model.createData(), self.robot.model.createData()
         self._changes: list[tuple[float, str, LimbState, Cause]] = []
-        self._states: list[int] = []
         self._plans: list[ContactPlan] = []
         self._footholds: dict[str, Foothold] = {}
-        self._recorder, self._logs = ClimbRecorder(plan, self._torques, self.dt), options.log
+        self._recorder, self._logs = ClimbRecorder(plan, self._torques, self.dt), validation.flag("log", log)
         self.step: Step | None = None
         self._outcome: ClimbOutcome | None = None
         self._reason, self._scene, self._in_sight = "", plan.scene, plan.scene
         self._failed: set[str] = set()
         self.approve: Approve | None = None
-        self.place: Placed = partial(_placed, plan.climber)
+        self.place: Placed = partial(plan_limb_work, plan.climber)
         self.refused, self.stopped = "", ""
-        self._unload, self._patience = (options.unload if self._torques else 0.0), options.patience
         self._pace = PlanPace(self.robot, self.dt, hard=not self._torques)
         self._noted: list[tuple[float, str]] = []
         self._broken, self._ends_by, self._given_way = "", inf, 0
-        self._ahead = StateAhead(self.robot, options.delay, self.dt)
+        self._ahead = StateAhead(self.robot, delay, self.dt)
         self._state = self._connection.reset(np.array(plan.q[0], dtype=float))
         self._felt: FeltPlant | None = plant if self._torques and isinstance(plant, FeltPlant) else None
-        self._motors = MotorWatch(self.robot, self.dt, options.delay)
+        self._motors = MotorWatch(self.robot, self.dt, delay)
         self._motors.begin(self._state.q, self._state.v)
         self.controller.reset(self._state.q)
         self._begin(plan)
@@ -194,11 +199,11 @@ class ClimbLoop:
             off = limb.stand(foothold, self._state.q, self.time) if foothold != FREE_LIMB else ""
             if off:
                 raise RangeError("plan.q", plan.q[0], off)
-        self._look()
         # Where it stands before the first tick, in which limbs may lift
         motion = self._state.q, self._state.v, np.zeros(self.robot.nv)
         none = np.zeros(len(WRENCH) * len(self._limbs)) if self._torques else None
-        self._recorder.add((self.time, 0.0), motion, self._logged(), self._states, True, none)
+        self._row = self._logged()
+        self._recorder.add((self.time, 0.0), motion, *self._row, True, none)
 
     def _begin(self, plan: ContactPlan, goes_on: bool = False) -> None:
         """A plan, from where the robot is, which is as fast as the plan at once where it goes on from another one."""
@@ -209,7 +214,7 @@ class ClimbLoop:
         self._log_rows = [rows[foothold.id] for foothold in plan.scene.footholds]
         reference = self.reference = PlanReference(plan, self.robot)
         ordered = sorted(plan.moves, key=lambda move: move.lift)
-        self._hand_overs = HandOvers(ordered, reference, self._unload)
+        self._hand_overs = HandOvers(ordered, reference, UNLOAD if self._torques else 0.0)
         for row, limb in enumerate(self._limbs):
             limb.begin([move for move in ordered if move.limb == row], plan, reference, plan.start[row])
         self._needs, self._turns, self._late, self._due = "", "", False, -inf
@@ -217,8 +222,7 @@ class ClimbLoop:
         self._granted: set[int] = set()
         self._other, self._aside, self.path_time = "", False, 0.0
         self._pace.begin(reference, 1.0 if goes_on else _rate_along(plan.v[0], self._state.v))
-        self._q, self._last_rate = np.array(plan.q[0], dtype=float), np.zeros(self.robot.nv)
-        self._look()
+        self._q, self._last_rate, self._row = np.array(plan.q[0], dtype=float), np.zeros(self.robot.nv), self._logged()
 
     # ------------------------------------------------------------------ what users do
 
@@ -259,18 +263,13 @@ class ClimbLoop:
         return ClimbRun(outcome, self._reason, self._recorder.log(), scene, tuple(self._plans), tuple(self._changes),
                         tuple(self._noted))  # fmt: skip
 
-    @contextmanager
-    def recorded(self, file: Path) -> Iterator[None]:
+    def recorded(self, file: Path) -> AbstractContextManager[None]:
         """Within it the log is written to a file as it comes, so that a run that is killed leaves what it did.
 
         Raises:
             LogFileError: it cannot be written.
         """
-        self._recorder.write_to(file)
-        try:
-            yield
-        finally:
-            self._recorder.close()
+        return self._recorder.written(file)
 
     def see(self, scene: ClimbScene) -> None:
         """What the scene is from now on: footholds may have gone or come, and bodies appeared.
@@ -322,10 +321,9 @@ class ClimbLoop:
         Raises:
             ShapeError, RangeError: a plan that is none, or that does not begin so; or the loop is not :attr:`steady`.
         """
-        _check_plan(plan)
-        off = float(np.abs(pin.difference(self.robot.model, self._q, np.asarray(plan.q[0], dtype=float))).max())
-        if not self.steady or off > CONTINUES or tuple(plan.start) != tuple(self._held):
-            raise RangeError("plan", off, "expected one that begins where the steady loop is, with its contacts")
+        if not self.steady:
+            raise RangeError("plan", self._pace.rate, "expected a loop that goes on by velocities at its full rate")
+        self._check(plan, Stance(self.held, self._q), CONTINUES)
         self._begin(plan, goes_on=True)
 
     def stop(self, reason: str) -> None:
@@ -387,7 +385,7 @@ class ClimbLoop:
     @property
     def held(self) -> tuple[int, ...]:
         """Of each limb the row of the foothold in the plan's scene that it holds, or ``FREE_LIMB``."""
-        return tuple(self._held)
+        return tuple(limb.held for limb in self._limbs)
 
     @property
     def coming(self) -> tuple[ContactMove, ...]:
@@ -420,7 +418,7 @@ class ClimbLoop:
         """Where the robot is, and on which footholds of the scene as :meth:`see` has it."""
         rows = {foothold.id: k for k, foothold in enumerate(self._scene.footholds)}
         own = self._plans[-1].scene.footholds
-        held = tuple(rows[own[k].id] if k != FREE_LIMB else FREE_LIMB for k in self._held)
+        held = tuple(rows[own[k].id] if k != FREE_LIMB else FREE_LIMB for k in self.held)
         return Stance(held, np.array(self._state.q))
 
     # ------------------------------------------------------------------ a tick
@@ -466,8 +464,7 @@ class ClimbLoop:
         motion = state.q, state.v, command
         self.step = step
         if self._logs:
-            solved = step.status == "solved"
-            self._recorder.add((state.time, ahead), motion, self._logged(), self._states, solved, wrenches)
+            self._recorder.add((state.time, ahead), motion, *self._row, step.status == "solved", wrenches)
         if self._grips is not None:
             self._heed(state, command)
         if self._torques:
@@ -478,7 +475,7 @@ class ClimbLoop:
             # Motors at their limits, or a load that nobody knows, may have kept the body from where the plan ends
             if self._followed() > ARRIVED:
                 self._go_on()
-            elif ahead > self.reference.end + self._patience:
+            elif ahead > self.reference.end + WAITS:
                 away = float(np.linalg.norm(state.q[:3] - self._q[:3]))
                 self._end(ClimbOutcome.STOPPED, f"the body is {1e3 * away:.1f} mm off the end of the plan")
 
@@ -606,7 +603,7 @@ class ClimbLoop:
                 continue
             lift = move.lift
             if self.approve and id(move) not in self._granted and limb.state is not LimbState.UNLOADING:
-                lift -= self._unload
+                lift -= UNLOAD if self._torques else 0.0
                 near = not self._pace.stops(self.path_time + 2.0 * self.dt, lift)
                 if near and not (self._needs or self._turns or self.stopped or self._other):
                     self._ask(self.approve, move)
@@ -620,7 +617,7 @@ class ClimbLoop:
         if answer is None:
             self.waiting = self.waiting or move
         elif answer:
-            self._other, self._asked = answer, move
+            self._other, self._another = answer, move
         else:
             self._granted.add(id(move))
             self._due = -inf
@@ -638,21 +635,19 @@ class ClimbLoop:
     def _change(self, limb: LimbMachine, cause: Cause) -> None:
         state = limb.change(cause, self._state.q, self.time)
         self._changes.append((self.time, limb.name, state, cause))
-        self._look()
-
-    def _look(self) -> None:
-        """What every tick needs of the limbs' states."""
-        self._held = [limb.held for limb in self._limbs]
-        self._aims = [limb.aim for limb in self._limbs]
-        self._states = [int(limb.state) for limb in self._limbs]
+        self._row = self._logged()
 
     # ------------------------------------------------------------------ plans
 
-    def _logged(self) -> list[int]:
-        """Contacts and aims as the log has them: rows of the footholds of all plans, those of the first plan first."""
-        return [self._log_rows[row] if row >= 0 else row for row in (*self._held, *self._aims)]
+    def _logged(self) -> tuple[list[int], list[int]]:
+        """Contacts and aims as the log has them, rows of the footholds of all plans, those of the first plan first; and
+        states.
+        """
+        held, aims = [limb.held for limb in self._limbs], [limb.aim for limb in self._limbs]
+        contacts = [self._log_rows[row] if row >= 0 else row for row in (*held, *aims)]
+        return contacts, [limb.state for limb in self._limbs]
 
-    def _check(self, plan: ContactPlan, stance: Stance | None = None) -> None:
+    def _check(self, plan: ContactPlan, stance: Stance | None = None, within: float = BEGINS) -> None:
         """Refuses a plan that is none, that does not begin in a stance, and under torques one that contacts or motors
         do not bear.
         """
@@ -661,61 +656,58 @@ class ClimbLoop:
             if tuple(plan.start) != stance.contacts:
                 raise RangeError("plan.start", plan.start, f"expected the stance's contacts {stance.contacts}")
             off = float(np.abs(pin.difference(self.robot.model, stance.q, np.asarray(plan.q[0], dtype=float))).max())
-            if off > BEGINS:
-                raise RangeError("plan.q", off, f"expected a plan that begins within {BEGINS:g} m and rad of the robot")
+            if off > within:
+                raise RangeError("plan.q", off, f"expected a plan that begins within {within:g} m and rad of the robot")
         if self._torques:
             check_borne(plan)
+
+    def _asked(self, planner: Onward, why: str, ends: bool = False) -> ContactPlan | None:
+        """What a planner has from where the robot is. The run ends where that is no plan that begins here; where it is
+        none, it has arrived if that may end it.
+        """
+        stance = self.stance
+        try:
+            plan = planner(self._scene, stance)
+            if plan is None and ends:
+                self._end(ClimbOutcome.ARRIVED, "")
+                return None
+            plan = validation.instance("plan", plan, ContactPlan, "a ContactPlan")
+            self._check(plan, stance)
+        except WbcError as error:
+            self._end(ClimbOutcome.STOPPED, f"{why}; {error}")
+            return None
+        return plan
 
     def _go_on(self) -> None:
         """A plan is done: what comes after it, if anything does."""
         if self._aside:
             self._needs = "another foothold was chosen"
             self._plan_anew()
-            return
-        after, stance = None, self.stance
-        if self._onward is not None:
-            try:
-                after = self._onward(self._scene, stance)
-                if after is not None:
-                    self._check(after, stance)
-            except WbcError as error:
-                self._end(ClimbOutcome.STOPPED, f"nothing comes after the plan; {error}")
-                return
-        if after is None:
+        elif self._onward is None:
             self._end(ClimbOutcome.ARRIVED, "")
-        else:
+        elif (after := self._asked(self._onward, "nothing comes after the plan", ends=True)) is not None:
             self._begin(after)
 
     def _plan_anew(self) -> None:
         """The robot is at rest, and what is left of the plan cannot be done."""
         if self._broken:
             self._end(ClimbOutcome.PLANT_FAILED, f"{self._broken}, seen at {self._noted[-1][0]:.2f} s")
-            return
-        if self._other and not self._needs:
-            self._go_aside(self._asked, self._other)
-            return
-        if self._replan is None:
+        elif self._other and not self._needs:
+            self._go_aside(self._another, self._other)
+        elif self._replan is None:
             self._end(ClimbOutcome.STOPPED, f"{self._needs}, and no planner was given")
-            return
-        stance = self.stance
-        try:
-            plan = self._replan(self._scene, stance)
-            self._check(plan, stance)
-        except WbcError as error:
-            self._end(ClimbOutcome.STOPPED, f"{self._needs}; {error}")
-            return
-        self._begin_anew(plan)
+        elif (plan := self._asked(self._replan, self._needs)) is not None:
+            self._begin_anew(plan)
 
     def _go_aside(self, move: ContactMove, foothold: str) -> None:
         """A limb goes to another foothold than its plan has, where it can; if not, the plan goes on waiting."""
-        self._other, stance = "", self.stance
+        self._other, self.refused, stance = "", "", self.stance
         try:
-            plan = self.place(self._scene, stance, self._limbs[move.limb].name, foothold)
-            _check_plan(plan)
+            plan = self.place(self._scene, stance, self._limbs[move.limb].name, [foothold])
+            self._check(plan, stance)
         except WbcError as error:
             self.refused = str(error)
             return
-        self.refused = ""
         self._begin_anew(plan)
         self._aside = True
         self._granted.update(id(move) for move in plan.moves)
@@ -727,9 +719,9 @@ class ClimbLoop:
                 self._change(limb, Cause.NEW_PLAN)
         self._begin(plan)
 
-    def _set_gains(self, options: LoopOptions) -> None:
+    def _set_gains(self) -> None:
         items: Any = self.controller
-        gain = options.bandwidth if self._torques else FOLLOWING / self.dt
+        gain = BANDWIDTH if self._torques else FOLLOWING / self.dt
         following = {"stiffness": gain**2, "damping": 2.0 * gain} if self._torques else {"gain": gain}
         items["reference"].set(**following)
         for limb in self._limbs:
@@ -758,12 +750,6 @@ def _rate_along(planned: Array, v: Array) -> float:
     if float(np.abs(planned).max()) <= STILL:
         return 1.0
     return min(max(float(v @ planned) / float(planned @ planned), 0.0), 1.0)
-
-
-def _placed(climber: Climber, scene: ClimbScene, stance: Stance, limb: str, foothold: str) -> ContactPlan:
-    from wbc.climb.limb_work import plan_limb_work
-
-    return plan_limb_work(climber, scene, stance, limb, [foothold])
 
 
 def _check_plan(plan: ContactPlan) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import pathlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -111,19 +113,15 @@ class ClimbRecorder:
         self._presence.append((row, time, there))
         self._recorder.send({"presence": self._tables()["presence"]})
 
-    def write_to(self, file: pathlib.Path) -> None:
-        """From now on ticks are written there as well, :data:`CHUNK` at once: of a run that is killed the file has what
-        was done until then.
-
-        Raises:
-            LogFileError: it cannot be written.
-        """
+    @contextmanager
+    def written(self, file: pathlib.Path) -> Iterator[None]:
+        """Within it ticks are written there as well, :data:`CHUNK` at once."""
         self._recorder.write_to(FileWriter(file, overwrite=True))
         self._recorder.send(self._tables())
-
-    def close(self) -> None:
-        """The rest is written, and nothing more is."""
-        self._recorder.close()
+        try:
+            yield
+        finally:
+            self._recorder.close()
 
     def log(self) -> Log:
         """All ticks, with the footholds as a table."""

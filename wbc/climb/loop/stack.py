@@ -102,7 +102,7 @@ class FootholdContact(Contact):
         most that weight: loads are shared in proportion to what contacts bear, and soles are pressed in their middle.
         """
         (a, b), most = self.kind.cone(), super().sizes(robot)
-        pressed = 0.0 if self.kind.pulls else min(most[2], getattr(self.kind, "most", np.inf))
+        pressed = 0.0 if self.kind.pulls else most[2]
         slopes = a @ self.borne.T
         rooms = np.full(slopes.shape, np.inf)
         np.divide((b - pressed * a[:, 2])[:, None], slopes, out=rooms, where=slopes > 0.0)

@@ -9,6 +9,8 @@
 
 /* Bounds on the slack that are kept of a set of contacts */
 #define BOUNDS 12
+/* Bounding spheres from which on shapes have no end [m] */
+#define ENDLESS 1e6
 
 /* Wrenches of a contact: w = N x with A x + s t <= b, in weights */
 typedef struct {
@@ -207,14 +209,32 @@ static double gap_along(const shape_t *a, const double *A, const shape_t *b, con
 }
 
 /* A row for every piece and body, then for every pair: two poses, the second one of pairs only, the distance at these, and the normal
- * if that was measured; 0: there is no memory */
+ * if that was measured; then the least and the greatest corner of every body along the axes of the world. 0: there is no memory */
 #define GAP_ROW 29
 static double *gap_rows(climb_t *c) {
     if (c->gap) return c->gap;
-    const size_t rows = (size_t)c->pieces * c->bodies + c->pairs;
-    if (!(c->gap = malloc((rows ? rows : 1) * GAP_ROW * sizeof *c->gap))) return 0;
+    const size_t rows = (size_t)c->pieces * c->bodies + c->pairs, numbers = rows * GAP_ROW;
+    if (!(c->gap = malloc((numbers + 6 * (size_t)c->bodies + 1) * sizeof *c->gap))) return 0;
     for (size_t k = 0; k < rows; k++) c->gap[k * GAP_ROW + 24] = -INFINITY;
+    for (int j = 0; j < c->bodies; j++) {
+        const shape_t *b = c->shape + c->pieces + j;
+        for (int i = 0; i < 3; i++) {
+            const double *at = c->body + 12 * j, axis[3] = {at[3 * i], at[3 * i + 1], at[3 * i + 2]};
+            const double far = b->size[5] >= ENDLESS ? INFINITY : convex(b) ? reach(b, axis) + b->size[4] : b->size[5];
+            c->gap[numbers + 6 * j + i] = at[9 + i] - far, c->gap[numbers + 6 * j + 3 + i] = at[9 + i] + far;
+        }
+    }
     return c->gap;
+}
+
+/* The square of how far a point is outside of a box along the axes of the world [m^2] */
+static double outside_of(const double *box, const double *point) {
+    double square = 0.0;
+    for (int i = 0; i < 3; i++) {
+        const double out = fmax(fmax(box[i] - point[i], point[i] - box[3 + i]), 0.0);
+        square += out * out;
+    }
+    return square;
 }
 
 /* How far no point of a ball round the origin of a pose moves on to another one [m] */
@@ -239,27 +259,43 @@ typedef struct {
  * -1 - piece. `near`: all pairs that are; where `within` is 0, one that lacks is enough */
 static double clearance_near(climb_t *c, const int *contact, const double *base, const placed_t *placed, int *which, near_t *near) {
     const tolerance_t how = {1e-10 * c->length, 1e-9 * c->length, 1e-5 * c->length};
-    double pose[c->pieces ? c->pieces : 1][12], least = INFINITY, *const known = gap_rows(c);
+    double pose[c->pieces ? c->pieces : 1][12], least = INFINITY, *const known = gap_rows(c), middle[3] = {0}, around = 0.0;
+    const double *boxes = known ? known + ((size_t)c->pieces * c->bodies + c->pairs) * GAP_ROW : 0;
     unsigned bit[c->pieces ? c->pieces : 1];
+    int beside_robot[c->bodies ? c->bodies : 1], count = 0, placed_pieces = 0;
     for (int k = 0; k < c->pieces; k++)
-        if ((bit[k] = near->seen & bit_of(c->piece[k].limb))) place_piece(c, k, base, placed, pose[k]);
+        if ((bit[k] = near->seen & bit_of(c->piece[k].limb))) {
+            place_piece(c, k, base, placed, pose[k]);
+            for (int i = 0; i < 3; i++) middle[i] += pose[k][9 + i];
+            placed_pieces++;
+        }
+    for (int i = 0; i < 3 && placed_pieces; i++) middle[i] /= placed_pieces;
+    for (int k = 0; k < c->pieces; k++) {
+        double apart[3];
+        if (!bit[k]) continue;
+        minus3(pose[k] + 9, middle, apart);
+        around = fmax(around, sqrt(dot3(apart, apart)) + c->shape[c->piece[k].shape].size[5]);
+    }
+    around += fmax(c->clear, 0.0) + near->within;
+    for (int j = 0; j < c->bodies; j++)
+        if (!boxes || outside_of(boxes + 6 * j, middle) <= around * around) beside_robot[count++] = j;
     for (int k = 0; k < c->pieces + c->pairs; k++) {
         const int own = k >= c->pieces;
         const int i = own ? c->pair[2 * (k - c->pieces)] : k, beside = own ? c->pair[2 * (k - c->pieces) + 1] : i;
         if (!bit[i] || !bit[beside] || !((bit[i] | bit[beside]) & near->of)) continue;
         const shape_t *a = c->shape + c->piece[i].shape;
-        for (int j = 0; j < (own ? 1 : c->bodies); j++) {
-            const int other = own ? beside : j;
+        for (int body = 0; body < (own ? 1 : count); body++) {
+            const int j = own ? 0 : beside_robot[body], other = own ? beside : j;
             const shape_t *b = c->shape + (own ? c->piece[other].shape : c->pieces + j);
             const double *at = own ? pose[other] : c->body + 12 * j;
             const double least_kept = kept_distance(c, contact, near->off, i, own ? -1 - other : j);
-            const double keep = least_kept + near->within * (own ? OF_LINKS : 1.0);
-            if (b->size[5] < 1e6) {
+            const double keep = least_kept + near->within * (own ? OF_LINKS : 1.0), sum = a->size[5] + fmax(keep, 0.0);
+            if (own && b->size[5] < ENDLESS) {
                 double apart[3];
                 minus3(pose[i] + 9, at + 9, apart);
-                const double sum = a->size[5] + b->size[5] + fmax(keep, 0.0);
-                if (dot3(apart, apart) > sum * sum) continue;
+                if (dot3(apart, apart) > (sum + b->size[5]) * (sum + b->size[5])) continue;
             }
+            if (!own && boxes && outside_of(boxes + 6 * j, pose[i] + 9) > sum * sum) continue;
             /* Where neither has moved far since they were measured last they are not measured again */
             double *last = known ? known + ((size_t)(own ? c->pieces * c->bodies + k - c->pieces : k * c->bodies + j)) * GAP_ROW : 0;
             if (last && last[24] > keep) {

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wbc.clearance import CylinderInside, EndlessCylinder, TriangleMesh
+from wbc.clearance.scene import patch_of
 from wbc.climb.climber import Climber
 from wbc.climb.scene import ClimbScene
 from wbc.multibody import pin
-from wbc.robot import Robot
 from wbc.shapes import HalfSpace, PlacedShape
-from wbc.shapes.surfaces import between_rows
 from wbc.style import CYCLE
+from wbc.symbolic.kinematics import joint_of
 from wbc.track import render
 from wbc.track.scene import link_meshes
 from wbc.validation import Array
@@ -62,7 +62,7 @@ def mixed(colour: str, white: float) -> Colour:
 def link_colours(climber: Climber) -> dict[str, Colour]:
     """Link that is drawn -> colour, of those that limbs move: each limb its own, darker at its tip."""
     robot, out = climber.robot, dict[str, Colour]()
-    carrier = {link: _joint(robot, link) for link, _ in link_meshes(robot)}
+    carrier = {link: joint_of(robot.model, link) for link, _ in link_meshes(robot)}
     for row, chain in enumerate(climber.chains):
         moved = {link: joint for link, joint in carrier.items() if set(robot.model.supports[joint]) & set(chain)}
         last = max(moved.values(), key=lambda joint: len(robot.model.supports[joint]), default=0)
@@ -133,26 +133,16 @@ def upwards(scene: ClimbScene, rows: Any) -> Array:
     return np.asarray(up / size) if size > 1e-6 else np.array([0.0, 0.0, 1.0])
 
 
-def _joint(robot: Robot, link: str) -> int:
-    return int(robot.model.frames[robot.model.getFrameId(link)].parentJoint)
-
-
 def _patch(shape: HalfSpace | EndlessCylinder, pose: pin.SE3, places: Array, reach: float) -> Array:
     """The part of a body without end that is under some places."""
     local, edge, under = (places - pose.translation) @ pose.rotation, EDGE * reach, UNDER * reach
     if isinstance(shape, HalfSpace):
-        (x, y), (right, top) = local[:, :2].min(axis=0) - edge, local[:, :2].max(axis=0) + edge
-        rows = np.array([[[x, y, -under], [right, y, -under]], [[x, top, -under], [right, top, -under]]])
-    else:
-        radius, angle = shape.radius - under, np.arctan2(local[:, 1], local[:, 0])
-        middle = np.arctan2(np.sin(angle).mean(), np.cos(angle).mean())
-        spread = (angle - middle + np.pi) % (2.0 * np.pi) - np.pi
-        first, last = (
-            np.clip(end, -np.pi, np.pi) for end in (spread.min() - edge / radius, spread.max() + edge / radius)
-        )
-        count = max(2, int(np.ceil((last - first) / (2.0 * np.pi) * FACETS)) + 1)
-        at = middle + np.linspace(first, last, count)
-        ring = np.stack([radius * np.cos(at), radius * np.sin(at), np.zeros(count)], axis=1)
-        low, high = local[:, 2].min() - edge, local[:, 2].max() + edge
-        rows = np.stack([ring + [0.0, 0.0, low], ring + [0.0, 0.0, high]])
-    return np.asarray(between_rows(rows) @ pose.rotation.T + pose.translation)
+        sides = patch_of(shape, local[:, :2].min(axis=0) - edge, local[:, :2].max(axis=0) + edge, FACETS)
+        return np.asarray((sides - [0.0, 0.0, under]) @ pose.rotation.T + pose.translation)
+    inner, angle = EndlessCylinder(shape.radius - under), np.arctan2(local[:, 1], local[:, 0])
+    middle = np.arctan2(np.sin(angle).mean(), np.cos(angle).mean())
+    spread = (angle - middle + np.pi) % (2.0 * np.pi) - np.pi
+    ends = np.clip([spread.min() - edge / inner.radius, spread.max() + edge / inner.radius], -np.pi, np.pi) + middle
+    low, high = local[:, 2].min() - edge, local[:, 2].max() + edge
+    sides = patch_of(inner, [ends[0], low], [ends[1], high], FACETS)
+    return np.asarray(sides @ pose.rotation.T + pose.translation)

@@ -65,12 +65,8 @@ def _rebuilt(storage: Any, offset: int, size: Sequence[int], stride: Sequence[in
 
 
 def load(path: pathlib.Path) -> Any:
-    """The array of an npy or of torch's pt, arrays by name of an npz, or what the pickle of any other file holds.
-
-    Arrays of an npz that only a pickle holds are left out.
-
-    Raises:
-        ClipFileError: it is no such file, is cut off, or asks for anything but arrays.
+    """The array of an npy or pt, arrays by name of an npz without those that only a pickle holds, or what the pickle of
+    any other file holds; :class:`ClipFileError` where it is no such file or asks for anything but arrays.
     """
     kind = path.suffix.lower()
     try:

@@ -8,8 +8,10 @@ from functools import cached_property
 
 import numpy as np
 
+from wbc.errors import RangeError
 from wbc.retarget.body import BodyError, find_body
 from wbc.retarget.clip import Array, Skeleton, ancestors
+from wbc.retarget.hands import find_hand
 from wbc.retarget.sources.layouts import to_the_left
 from wbc.retarget.sources.recorded import Recorded
 from wbc.retarget.words import numbers_of
@@ -32,8 +34,10 @@ UNITS = {
 }  # fmt: skip
 #: A person stands up to this share of that length, in a frame or in the rest pose
 UPRIGHT = 0.75
-#: Size of what is no person who stands [m]: a dog, a person who crawls, a hand
+#: Size of what is no person who stands [m]: a dog, a person who crawls
 OTHER_SIZE = 0.8
+#: Size of a hand [m]
+HAND_SIZE = 0.18
 #: Cost of an axis along which the head is not above the feet
 NOT_ABOVE = 0.7
 #: Which of two axes whose costs are closer than this is up is not sure
@@ -45,12 +49,7 @@ STANDING_SPEED = 0.12
 
 
 class FileAxes:
-    """What the points of a clip without gaps say of its file's axes and unit.
-
-    Attributes:
-        clip: whose points they are. size: median over the frames of the diagonal of a box round them, in the file's
-            unit. rest: the skeleton's points in its rest pose; None where there is none.
-    """
+    """What the points of a clip without gaps say of its file's axes and unit."""
 
     def __init__(self, clip: Recorded) -> None:
         self.clip, skeleton = clip, None
@@ -111,16 +110,38 @@ class FileAxes:
         # In nearly all frames: hips and feet may be across each other for a moment
         return bool(lefts.size and np.mean(lefts < 0.0) > 0.9)
 
-    def find_unit(self, up: str) -> tuple[str, float]:
-        """Name of the file's unit, "" where none makes it a body's size, and the size of the body in it."""
-        heights, along = self.clip.points @ TO_Z_UP[up][2], self._head_to_feet()
+    def find_unit(self, up: str) -> float:
+        """Length of the file's unit [m], that of a body's size; a note says it where it is not a metre."""
+        heights, along, size = self.clip.points @ TO_Z_UP[up][2], self._head_to_feet(), self.size
         tall = float(np.nanmax(np.nanmax(heights, axis=1) - np.nanmin(heights, axis=1)))
         if self.rest is not None and self.rest_up:
             tall = max(tall, float(np.ptp(self.rest @ TO_Z_UP[self.rest_up][2])))
         if along and tall > UPRIGHT * along:
-            return next((name for name, (_, _, (low, high)) in UNITS.items() if low <= along < high), ""), along
-        name = min(("m", "cm", "mm"), key=lambda unit: abs(np.log(max(self.size, 1e-12) * UNITS[unit][0] / OTHER_SIZE)))
-        return name if 0.1 < self.size * UNITS[name][0] / OTHER_SIZE < 10.0 else "", self.size
+            size = along
+            name = next((name for name, (_, _, (low, high)) in UNITS.items() if low <= along < high), "")
+        else:
+            expected = HAND_SIZE if self._is_hand() else OTHER_SIZE
+            sizes = {name: size * UNITS[name][0] / expected for name in ("m", "cm", "mm")}
+            name = min(sizes, key=lambda unit: abs(np.log(max(sizes[unit], 1e-12))))
+            name = name if 0.1 < sizes[name] < 10.0 else ""
+        if not name:
+            raise RangeError(
+                "unit", size, "the body's size in the file fits no unit; give unit= of m, cm, mm, in or ft"
+            )
+        length, whole_name, _ = UNITS[name]
+        self.clip.notes += [f"its unit is {whole_name}: the body is {size:.4g} of them"] if name != "m" else []
+        return length
+
+    def _is_hand(self) -> bool:
+        """Whether every branch of the skeleton is a finger of one palm."""
+        names, parents, places = self.clip.names, self.clip.parents, self.clip.points[len(self.clip.points) // 2]
+        if parents.count(-1) != 1 or (self._head and self._feet):
+            return False
+        offsets = places - np.where(np.array(parents)[:, None] < 0, 0.0, places[parents])
+        with contextlib.suppress(BodyError):
+            hand = find_hand(Skeleton(tuple(names), tuple(parents), offsets, (False,) * len(names)))
+            return {chain[-1] for chain in hand.limbs.values()} == {*range(len(names))} - {*parents}
+        return False
 
     def _head_to_feet(self) -> float:
         """Length of bones from head to foot, or how far these are apart without bones; 0 where they are not known."""

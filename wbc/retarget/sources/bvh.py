@@ -19,11 +19,7 @@ Channels = list[tuple[int, bool, int]]
 
 
 def read_bvh(path: pathlib.Path) -> Recorded:
-    """A BVH file.
-
-    Raises:
-        ClipFileError: it is none, or ends before its second frame; the text says in which line.
-    """
+    """A BVH file; :class:`ClipFileError`, with the line, where it is none or ends before its second frame."""
     lines = [(row, words) for row, line in enumerate(text_of(path).splitlines(), 1) if (words := line.split())]
     motion = next((k for k, (_, words) in enumerate(lines) if words[0].upper() == "MOTION"), len(lines))
     clip, channels = _hierarchy(path, lines[: motion + 1])

@@ -22,11 +22,7 @@ BLOCK = 512
 
 
 def read_c3d(path: pathlib.Path) -> Recorded:
-    """Markers of a C3D file, by the package ezc3d.
-
-    Raises:
-        MissingPackageError: ezc3d is not installed. ClipFileError: it is no C3D file, is cut off, or has no markers.
-    """
+    """Markers of a C3D file, by the package ezc3d; :class:`ClipFileError` of a file that is none or has no markers."""
     extras.require("clips", "a C3D file", "ezc3d")
     import ezc3d
 

@@ -96,14 +96,8 @@ def read_csv(path: pathlib.Path, names: Names) -> Recorded:
 
 
 def of_points(path: pathlib.Path, points: Array, names: Names) -> Recorded:
-    """A clip of points, with names and parents as far as they are known.
-
-    Args:
-        points: [frames, joints, 3], or in columns, or InterMimic's tensor of 591 columns.
-        names: of the joints; or of a layout: a key of :data:`~wbc.retarget.sources.layouts.LAYOUTS`.
-
-    Raises:
-        ClipFileError: no points of joints. UnknownNameError: no such layout. ShapeError: another number of names.
+    """A clip of points [frames, joints, 3], or in columns, with names, or those of a layout, and parents as far as they
+    are known; :class:`ClipFileError`, UnknownNameError and ShapeError of what is none.
     """
     given = np.asarray(points)
     if given.dtype.kind not in "fiu" or given.ndim not in (2, 3) or 0 in given.shape:

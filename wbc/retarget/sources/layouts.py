@@ -107,9 +107,7 @@ LAYOUTS = {
 
 
 def best_layout(points: Array) -> str:
-    """The layout with as many joints whose bones change their lengths least, as a share of the longest; "" where none
-    has as many. Of two that differ in left and right alone it is the one whose person is no mirror image.
-    """
+    """The layout of as many joints whose bones keep their lengths best, and whose person is no mirror image; or ""."""
     frames = points[:: max(1, len(points) // 200)]
 
     def cost(name: str) -> tuple[float, bool]:
@@ -126,9 +124,7 @@ def best_layout(points: Array) -> str:
 
 
 def to_the_left(names: Sequence[str], points: Array, up: Array) -> Array:
-    """How far the left hip is to the left of the right one as the feet point, times the lengths of these, about a
-    direction that is up [3] or [frames, 3]: below 0 in a mirror [frames]; empty without names of hips and feet.
-    """
+    """How far the left hip is left of the right one as feet point, about up; below 0 in a mirror [frames]; or empty."""
     hips, toes, heels = ([numbers_of(names, part, side) for side in (1, -1)] for part in ("hip", "toe", "hindfoot"))
     heels = [[k for k in own if k not in toe] for own, toe in zip(heels, toes, strict=True)]
     if not all((*hips, *toes, *heels)):

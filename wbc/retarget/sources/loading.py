@@ -66,8 +66,6 @@ def load_clip(
     """
     file = validation.file_path("clip", path)
     recorded = _read(file, body_model, names)
-    if names is not None and file.suffix.lower() in (".bvh", ".c3d"):
-        recorded.notes.append("names= is for files without names, and is left out")
     recorded.rate = _rate(rate, recorded)
     return _finished(recorded, file.stem, up, unit)
 
@@ -83,7 +81,9 @@ def _read(file: pathlib.Path, body_model: str | os.PathLike[str] | None, names: 
     if kind == ".csv":
         return read_csv(file, names)
     if kind in (".bvh", ".c3d"):
-        return read_bvh(file) if kind == ".bvh" else read_c3d(file)
+        recorded = read_bvh(file) if kind == ".bvh" else read_c3d(file)
+        recorded.notes += [] if names is None else ["names= is for files without names, and is left out"]
+        return recorded
     data = arrays.load(file)
     if kind == ".pkl" or has_poses(data):
         return read_smpl(file, data, None if body_model is None else validation.file_path("body_model", body_model))
@@ -108,9 +108,7 @@ def _rate(given: float | None, recorded: Recorded) -> float:
 def _finished(recorded: Recorded, name: str, up: str | None, unit: str | float | None) -> Clip:
     """The clip with z up, in metres, with all points."""
     _without_unseen(recorded, name)
-    notes, names, parents, rate, turns = (
-        recorded.notes, recorded.names, recorded.parents, recorded.rate, recorded.turns,
-    )  # fmt: skip
+    notes, names, parents, rate, turns = (getattr(recorded, k) for k in ("notes", "names", "parents", "rate", "turns"))
     # Axes and units are looked for in points without gaps
     axes = FileAxes(replace(recorded, points=fill_gaps(recorded.points, parents, names, rate)))
     up = axes.find_up() if up is None else validation.one_of("up", up, TO_Z_UP)
@@ -145,24 +143,16 @@ def _unit(axes: FileAxes, up: str, given: str | float | None) -> float:
     """Length of the file's unit [m]."""
     if isinstance(given, str):
         return UNITS[validation.one_of("unit", given, UNITS)][0]
-    if given is not None:
-        return validation.scalar("unit", given, low=1e-6, high=1e3, unit="m")
-    name, size = axes.find_unit(up)
-    if not name:
-        raise RangeError("unit", size, "the body's size in the file fits no unit; give unit= of m, cm, mm, in or ft")
-    length, whole_name, _ = UNITS[name]
-    if name != "m":
-        axes.clip.notes.append(f"its unit is {whole_name}: the body is {size:.4g} of them")
-    return length
+    return axes.find_unit(up) if given is None else validation.scalar("unit", given, low=1e-6, high=1e3, unit="m")
 
 
 def _without_unseen(recorded: Recorded, name: str) -> None:
     """Take out joints without a point in any frame; their children hang from their parents."""
     there = np.asarray(np.isfinite(recorded.points).all(axis=2).any(axis=0))
-    if not there.any():
-        raise no_clip(name, "no point in any frame")
     kept = np.flatnonzero(there).tolist()
-    if gone := [joint for joint, seen in zip(recorded.names, there, strict=True) if not seen]:
+    if not kept:
+        raise no_clip(name, "no point in any frame")
+    if gone := [recorded.names[joint] for joint in np.flatnonzero(~there)]:
         above = [nearest_above(recorded.parents, joint, kept) for joint in kept]
         recorded.parents = [kept.index(joint) if joint >= 0 else -1 for joint in above]
         recorded.names, recorded.points = [recorded.names[joint] for joint in kept], recorded.points[:, kept]

@@ -20,11 +20,10 @@ EXPLAINED = 0.35
 def fill_gaps(
     points: Array, parents: Sequence[int], names: Sequence[str], rate: float, notes: list[str] | None = None
 ) -> Array:
-    """Points without NaN [frames, joints, 3]; what was filled is noted.
+    """Points without NaN [frames, joints, 3]; what was filled is noted. Joints that were never seen stay NaN.
 
     A root is filled along a curve through the frames in which it was seen; any other joint by its offset from its
-    parent, of the bone's length, and a joint without a parent beside others by its offset from their middle. Before the
-    first and after the last time that it was seen a joint keeps its offset. Joints that were never seen stay NaN.
+    parent, of the bone's length, and a joint without a parent beside others by its offset from their middle.
     """
     lost = np.asarray(~np.isfinite(points).all(axis=2))
     if not lost.any():
@@ -64,13 +63,10 @@ def between(values: Array) -> Array:
 
 
 def mend_swaps(points: Array, names: Sequence[str], rate: float, notes: list[str]) -> Array:
-    """The points with their names as they are in most frames [frames, joints, 3]; what was mended is noted.
+    """The points [frames, joints, 3] [m] with their names as they are in most frames; what was mended is noted.
 
     From one frame to the next the points that jump are given to the places that they are nearest to, where that
     explains the jumps; what most frames call a point is its name.
-
-    Args:
-        points: in metres; NaN where one is lost.
     """
     count = points.shape[1]
     order: NDArray[np.intp] = np.arange(count)

@@ -21,18 +21,13 @@ RATES = ("rate", "fps", "mocap_framerate", "mocap_frame_rate", "frequency", "sam
 
 @dataclass
 class Recorded:
-    """A clip as its file has it.
+    """A clip as its file has it, along the file's axes; NaN where a point is missing, rate 0 where it is not said.
 
     Attributes:
-        names: of the joints or markers.
         parents: number of each joint's parent; -1 at roots and where nothing is known.
-        points: along the file's axes [frames, joints, 3]; NaN where a point is missing.
-        rate: frames a second [Hz]; 0 where the file does not say.
         offsets: from the parent in the rest pose, along its axes [joints, 3]; None where there is none.
         turns: rotations from the rest pose, from its axes to the file's [frames, joints, 3, 3]; None: points alone.
-        ends: joints that only end a bone.
-        seen: whether a point was there [frames, joints]; None: where it is not NaN.
-        notes: what was found.
+        ends: joints that only end a bone. seen: whether a point was there; None: where it is not NaN.
     """
 
     names: list[str]
@@ -50,12 +45,7 @@ class Recorded:
 
             R_j = R_parent R_own,j        p_j = p_parent + R_parent d_j
 
-        Args:
-            own: rotations in the parent's axes [frames, joints, 3, 3]; NaN where they are missing.
-            moves: joint -> d_j of each frame [frames, 3]; elsewhere it is the joint's offset.
-
-        Raises:
-            ClipFileError: a joint without numbers in any frame.
+        Of R_own [frames, joints, 3, 3], and of d where it is not a joint's offset, by joint [frames, 3].
         """
         points = np.broadcast_to(np.asarray(self.offsets), own.shape[:3]).copy()
         for joint, move in moves.items():

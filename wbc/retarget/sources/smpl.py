@@ -22,6 +22,11 @@ PLACES = ("trans", "smpl_trans", "transl")
 POSE_PARTS = ("root_orient", "pose_body", "pose_jaw", "pose_eye", "pose_hand")
 #: Number of joints -> the layout that has them
 OF_SIZE = {24: "smpl", 22: "smpl-body", 52: "smplh", 55: "smplx"}
+#: Why a clip cannot be read
+NO_MODEL = (
+    "it has rotations of a body model and no places of joints; give body_model= (--body-model), your own file of SMPL, "
+    "SMPL-H or SMPL-X (npz or pkl). None is shipped: its licence asks every user to register"
+)
 #: Joints of the body, which all models have in the same order
 BODY = 22
 
@@ -32,25 +37,15 @@ def has_poses(data: object) -> bool:
 
 
 def read_smpl(path: pathlib.Path, data: Any, body_model: pathlib.Path | None) -> Recorded:
-    """A clip of rotations, by a body model.
+    """A clip of rotations in arrays by name, by the file of a body model: SMPL, SMPL-H or SMPL-X, npz or pkl.
 
-        J = J_regressor (v_template + shapedirs betas)        joints as the model's tree has them, turned by the poses
-
-    Args:
-        data: arrays of the file. body_model: a file of SMPL, SMPL-H or SMPL-X, npz or pkl.
-
-    Raises:
-        ClipFileError: a body model is needed, or one of the two has no such arrays.
+    Joints are J = J_regressor (v_template + shapedirs betas), turned by the poses along the model's tree.
     """
     if not has_poses(data):
         raise no_clip(path, f"no clip of a body model: expected {', '.join(POSES)}")
     poses = _poses(path, data)
     if body_model is None:
-        reason = (
-            "it has rotations of a body model and no places of joints; give body_model= (--body-model), your own file "
-            "of SMPL, SMPL-H or SMPL-X (npz or pkl). None is shipped: its licence asks every user to register"
-        )
-        raise no_clip(path, reason)
+        raise no_clip(path, NO_MODEL)
     notes: list[str] = []
     joints, parents = _joints(body_model, data.get("betas"), notes)
     frames, count = poses.shape[:2]
@@ -62,13 +57,12 @@ def read_smpl(path: pathlib.Path, data: Any, body_model: pathlib.Path | None) ->
         raise no_clip(body_model, "its joints are no tree of SMPL, SMPL-H or SMPL-X")
     offsets = joints[:used] - np.where(np.array(parents)[:, None] < 0, 0.0, joints[parents])
     own = rotations.exponential(poses[:, :used].reshape(-1, 3)).reshape(frames, used, 3, 3)
-    moves = np.asarray(first_of(data, PLACES) if first_of(data, PLACES) is not None else np.zeros((frames, 3)), float)
-    moves = moves.reshape(-1, 3) / float(np.ravel(data.get("smpl_scaling", 1.0))[0])
+    given = first_of(data, PLACES)
+    moves = np.asarray(np.zeros((frames, 3)) if given is None else given, dtype=float).reshape(-1, 3)
+    moves = moves / float(np.ravel(data.get("smpl_scaling", 1.0))[0])
     if len(moves) != frames:
         raise no_clip(path, f"{len(moves)} places of the root for {frames} frames")
-    clip = Recorded(
-        list(layout.names), parents, moves, rate_in(data), offsets, ends=[False] * used, notes=notes,
-    )  # fmt: skip
+    clip = Recorded([*layout.names], parents, moves, rate_in(data), offsets, ends=[False] * used, notes=notes)
     return clip.place(path, own, {0: offsets[0] + moves})
 
 

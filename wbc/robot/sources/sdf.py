@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pathlib
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable, Mapping
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import partial
 
@@ -14,7 +15,8 @@ from wbc.errors import RobotFileError
 from wbc.multibody import own, single_joint
 from wbc.robot.loops import Kind, Loop
 from wbc.robot.sources.description import ROOT, Description, Mimic, own_base, with_base
-from wbc.robot.sources.urdf_checks import Remarks, has_direction, shown
+from wbc.robot.sources.sdf_frames import MODEL, WORLD, SdfFrames, SdfPart
+from wbc.robot.sources.urdf_checks import Remarks, check_inertias, has_direction, meant, shown
 from wbc.validation import Array
 
 #: Joints of the format that a tree can have -> the loop that they are where both of their links hang on others already
@@ -25,13 +27,37 @@ KINDS: Mapping[str, Kind] = {
     "ball": "connect",
     "fixed": "weld",
 }
-WORLD = "world"
 #: Limits at or beyond this are none [rad, m]
 NONE = 1e15
-#: Largest difference of a quaternion's length from 1
-UNIT = 1e-3
-#: What a model may have that moves nothing: nothing is said of it
-_MUTE = ("link", "joint", "pose", "static", "self_collide", "frame", "enable_wind", "allow_auto_disable")
+#: What is read of each element, and of its attributes
+_SDF_READ = {
+    "model": ("link", "joint", "frame", "model", "pose", "static"),
+    "link": ("pose", "inertial"),
+    "inertial": ("pose", "mass", "inertia"),
+    "inertia": ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"),
+    "frame": ("pose",),
+    "joint": ("parent", "child", "pose", "axis"),
+    "axis": ("xyz", "limit", "dynamics", "mimic", "use_parent_model_frame"),
+    "limit": ("lower", "upper", "velocity", "effort"),
+    "dynamics": ("damping", "friction", "spring_stiffness"),
+    "mimic": ("multiplier", "offset", "reference"),
+}
+_SDF_ATTRIBUTES = {
+    "model": ("name", "canonical_link", "placement_frame"),
+    "pose": ("relative_to", "rotation_format", "degrees"),
+    "xyz": ("expressed_in",),
+    "frame": ("name", "attached_to"),
+    "mimic": ("joint", "axis"),
+}
+#: Elements of which an element may have several
+_MANY = ("link", "joint", "frame", "model")
+#: What moves nothing: nothing is said of it
+_MUTE = (
+    *("self_collide", "enable_wind", "allow_auto_disable", "visual", "collision", "sensor", "light"),
+    *("physics", "stiffness", "dissipation", "spring_reference"),
+)
+#: What says only what holds anyhow
+_USUAL = {"gravity": ("true", "1"), "kinematic": ("false", "0")}
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +65,7 @@ class _Joint:
     """A joint of the file.
 
     Attributes:
-        element: what the file says. name, kind, parent, child: as there.
+        element: what the file says. name, kind: as there. parent, child: its links, or the world.
         pose: in the model. axis: in the joint, (0, 0, 0) where it has none.
     """
 
@@ -65,41 +91,53 @@ class _Joint:
 
 
 def read_sdf(path: pathlib.Path, tree: ElementTree.Element, base: str | None = None) -> Description:
-    """The description in an SDF file of one model. A link hangs on the first joint of which it is the child; what no
-    such joint leads to hangs on another one, as its parent. All other joints close loops.
+    """The description in an SDF file of one model, with the models in it, whose names lead: ``arm::hand``. A link hangs
+    on the first joint of which it is the child; what no such joint leads to hangs on another one, as its parent. All
+    other joints close loops.
 
-    A model that no joint ties to the world has a floating base by itself, at the pose of its root link.
+    A model that no joint ties to the world, and that is not static, has a floating base by itself, at the pose of its
+    root link.
 
     Raises:
-        RobotFileError: no or several models, models in models, joints of a kind, frames or links that are not there,
-            numbers that are none, links that nothing ties to the others; what they are and where.
+        RobotFileError: no or several models, files that are included, joints of a kind, frames or links that are not
+            there or there twice, numbers that are none, inertias that shapes give, links that nothing ties to the
+            others; what they are and where.
     """
     return _Reader(path, tree).read(base)
 
 
 class _Reader:
     def __init__(self, path: pathlib.Path, tree: ElementTree.Element) -> None:
-        self._path, self._remarks = path, Remarks(path)
+        self._path, self._remarks, self._tensors = path, Remarks(path), dict[str, Array]()
         models = [*tree.findall("model"), *tree.findall("world/model")]
         if len(models) != 1:
-            raise self._error(f"{len(models)} models, expected one")
+            inside = "; an <include> is not followed" * (tree.find("world/include") is not None)
+            raise self._error(f"{len(models)} models, expected one{inside}")
+        if tree.find("world/joint") is not None:
+            raise self._error("a <joint> of the world is not read: put it into the model")
+        for beside in tree.findall("world/include"):
+            self._remarks.add("sdf", f"no part of the robot is the <include> of {beside.findtext('uri')!r}")
         self._model = models[0]
-        for inside in ("model", "include"):
-            if self._model.find(inside) is not None:
-                raise self._error(f"<{inside}> within a model is not read")
-        self._links = {str(link.get("name")): link for link in self._model.findall("link")}
-        self._frames = {str(e.get("name")): e for e in self._model if e.tag in ("link", "joint", "frame")}
+        self._gravity = tree.findtext("world/gravity")
+        self._frames = SdfFrames(self._model, self._error)
+        self._links = self._frames.of_kind("link")
         version = [int(x) for x in tree.get("version", "1.6").split(".")[:2] if x.isdigit()]
         self._axes_in_model = version < [1, 5]
-        self._joints = [self._joint(joint) for joint in self._model.findall("joint")]
+        self._joints = [self._joint(joint) for joint in self._frames.of_kind("joint").values()]
+        self._static = (self._model.findtext("static") or "").strip() in ("true", "1")
+        self._held = any(joint.parent == WORLD for joint in self._joints)
 
     def read(self, base: str | None) -> Description:
         hangs = self._tree()
-        tied = any(joint.parent == WORLD for joint in self._joints)
-        roots = [link for link in self._links if link not in hangs]
-        start = self._pose(self._links[roots[0]], ()) if roots and not tied else own.SE3.Identity()
+        placed = self._frames.model_pose()
+        start = placed.inverse()
+        if not (self._held or self._static):
+            root = next(link for link in self._links if link not in hangs)
+            start = self._frames.pose(self._links[root])
         out, fixed = own.Model(), dict[str, tuple[int, own.SE3]]()
         out.name = self._model.get("name", "")
+        if self._gravity is not None:
+            out.gravity = own.Motion(self._frames.numbers(self._gravity, 3, "gravity of the world"), np.zeros(3))
         # Where each link is on the joint that carries it: (joint, pose of the model in it)
         fixed[WORLD] = 0, start.inverse()
         mimics, damping, friction = list[Mimic](), list[float](), list[float]()
@@ -118,9 +156,9 @@ class _Reader:
             else:
                 fixed[link] = fixed[WORLD]
             index, back = fixed[link]
-            placed = back * self._pose(self._links[link], ())
-            out.appendBodyToJoint(index, self._inertia(link), placed)
-            out.addBodyFrame(link, index, placed, 0)
+            there = back * self._frames.pose(self._links[link])
+            out.appendBodyToJoint(index, self._inertia(link), there)
+            out.addBodyFrame(link, index, there, 0)
             for below in self._links:
                 if below in hangs and hangs[below].other(below) == link:
                     add(below)
@@ -128,14 +166,18 @@ class _Reader:
         for link in self._links:
             if link not in hangs or hangs[link].other(link) == WORLD:
                 add(link)
+        for frame in self._frames.of_kind("frame").values():
+            index, back = fixed[self._frames.link_of(str(frame.element.get("name")), frame.scope, frame.name)]
+            there = back * self._frames.pose(frame)
+            out.addFrame(own.Frame(frame.name, index, 0, there, own.FrameType.OP_FRAME))
         loops = tuple(self._loop(out, joint, fixed) for joint in self._joints if joint not in hangs.values())
         out.damping, loss = np.array(damping), np.array(friction)
         out.upperDryFrictionLimit, out.lowerDryFrictionLimit = loss, -loss
         self._say()
-        whole, kind = with_base(out, base if base or tied else "floating")
+        whole, kind = with_base(out, base if base or self._held or self._static else "floating")
         states = {}
         if kind == "floating" and own_base(out) == "fixed":
-            states["home"] = {ROOT: np.array(own.SE3ToXYZQUAT(start))}
+            states["home"] = {ROOT: np.array(own.SE3ToXYZQUAT(placed * start))}
         return Description(
             whole, kind, tuple(mimics), states, notes=self._remarks.said(), source=str(self._path), loops=loops
         )
@@ -145,8 +187,10 @@ class _Reader:
         hangs = dict[str, _Joint]()
         for joint in self._joints:
             hangs.setdefault(joint.child, joint)
-        tied = any(joint.parent == WORLD for joint in self._joints)
-        root = WORLD if tied else next((link for link in self._links if link not in hangs), WORLD)
+        root = next((link for link in self._links if link not in hangs), next(iter(self._links)))
+        if self._held:
+            root = WORLD
+        hangs.pop(root, None)
         reached = {root}
 
         def grow(ends: Callable[[_Joint], bool]) -> bool:
@@ -158,7 +202,7 @@ class _Reader:
             reached.add(link)
             return True
 
-        while grow(lambda j: hangs[j.child] is j and j.parent in reached and j.child not in reached) or grow(
+        while grow(lambda j: hangs.get(j.child) is j and j.parent in reached and j.child not in reached) or grow(
             lambda j: (j.parent in reached) != (j.child in reached)
         ):
             pass
@@ -209,27 +253,29 @@ class _Reader:
             self._remarks.add("loops", f"{joint.name} closes a loop: its range {ends[0]:g} to {ends[1]:g} is not kept")
         return Loop(joint.name, names[0], names[1], KINDS[joint.kind])
 
-    def _joint(self, element: ElementTree.Element) -> _Joint:
-        name, kind = str(element.get("name")), str(element.get("type"))
+    def _joint(self, placed: SdfPart) -> _Joint:
+        element, name, kind = placed.element, placed.name, str(placed.element.get("type"))
         if kind not in KINDS:
             raise self._error(f"joint {name!r} is of type {kind!r}, which is none of {', '.join(KINDS)}")
         ends = [(element.findtext(key) or "").strip() for key in ("parent", "child")]
-        for end in ends:
-            if end not in self._links and (end != WORLD or end == ends[1]):
-                raise self._error(f"joint {name!r} is between links of which there is no {end!r}")
-        pose, axis = self._pose(element, ()), np.zeros(3)
+        if WORLD not in ends[:1]:
+            ends[0] = self._frames.link_of(ends[0], placed.scope, name)
+        ends[1] = self._frames.link_of(ends[1], placed.scope, name)
+        if ends[0] == ends[1]:
+            raise self._error(f"joint {name!r} is between the link {ends[0]!r} and itself")
+        pose, axis = self._frames.pose(placed), np.zeros(3)
         if kind not in ("ball", "fixed"):
-            axis = self._numbers(element.findtext("axis/xyz") or "0 0 1", 3, f"axis of {name}")
+            axis = self._frames.numbers(element.findtext("axis/xyz") or "0 0 1", 3, f"axis of {name}")
             if not has_direction(axis):
                 raise self._error(f"joint {name!r} has no direction: its axis is {shown(axis)}")
             xyz, flag = element.find("axis/xyz"), (element.findtext("axis/use_parent_model_frame") or "").strip()
             seen_from = xyz.get("expressed_in", "") if xyz is not None else ""
             in_model = self._axes_in_model if not flag else flag in ("1", "true")
             if seen_from or in_model:
-                frame = self._named(seen_from or "__model__", name, ())
-                axis = pose.rotation.T @ frame.rotation @ axis
+                axes = self._frames.axes(seen_from or MODEL, placed.scope, name)
+                axis = self._frames.turned(placed).T @ axes @ axis
             axis = axis / np.linalg.norm(axis)
-        if (self._number(element, "axis/dynamics/spring_stiffness", 0.0)) != 0.0:
+        if self._number(element, "axis/dynamics/spring_stiffness", 0.0) != 0.0:
             self._remarks.add("forces", f"the spring of {name} is not held: torques do not know of it")
         return _Joint(element, name, kind, ends[0], ends[1], pose, axis)
 
@@ -237,86 +283,67 @@ class _Reader:
         mimic = joint.element.find("axis/mimic")
         if mimic is None:
             return ()
+        leader = joint.name.removesuffix(str(joint.element.get("name"))) + str(mimic.get("joint"))
+        if leader not in self._frames.of_kind("joint"):
+            self._remarks.add("mimic", f"{joint.name} stays free: there is no {leader}, which it would follow")
+            return ()
         number = partial(self._number, mimic)
         ratio = number("multiplier", 1.0)
         offset = number("offset", 0.0) - ratio * number("reference", 0.0)
-        return (Mimic(joint.name, str(mimic.get("joint")), ratio, offset),)
+        return (Mimic(joint.name, leader, ratio, offset),)
 
     def _inertia(self, link: str) -> own.Inertia:
         """Of a link at its own frame; what the file leaves out is 1 kg and 1 kg m^2, as the format says."""
-        element = self._links[link]
+        element = self._links[link].element
         if (inertial := element.find("inertial")) is None:
             self._remarks.add("inertia", f"link {link!r} has no <inertial>: it weighs 1 kg, as the format says")
             inertial = ElementTree.Element("inertial")
+        if inertial.get("auto", "false") in ("true", "1"):
+            raise self._error(f"link {link!r} states no inertia (auto); what its shapes would give is not worked out")
         number = partial(self._number, inertial)
         mass = number("mass", 1.0)
         if mass < 0.0:
             raise self._error(f"link {link!r} has a mass of {mass:g} kg")
         xx, yy, zz = (number(f"inertia/{key}", 1.0) for key in ("ixx", "iyy", "izz"))
         xy, xz, yz = (number(f"inertia/{key}", 0.0) for key in ("ixy", "ixz", "iyz"))
-        pose = self._own_pose(inertial)
-        moved: own.Inertia = pose.act(
-            own.Inertia(mass, np.zeros(3), np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
-        )
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        self._tensors[link] = tensor
+        moved: own.Inertia = self._frames.stated(inertial).act(own.Inertia(mass, np.zeros(3), tensor))
         return moved
-
-    def _pose(self, element: ElementTree.Element, way: tuple[str, ...]) -> own.SE3:
-        """Of a link, joint or frame in the model."""
-        name, pose = str(element.get("name")), element.find("pose")
-        if name in way:
-            raise self._error(f"the pose of {name!r} is relative to itself, by {', '.join(way)}")
-        above = pose.get("relative_to", "") if pose is not None else ""
-        if not above and element.tag == "joint":
-            above = (element.findtext("child") or "").strip()
-        if not above and element.tag == "frame":
-            above = element.get("attached_to", "")
-        return self._named(above or "__model__", name, (*way, name)) * self._own_pose(element)
-
-    def _named(self, frame: str, asked: str, way: tuple[str, ...]) -> own.SE3:
-        if frame in ("__model__", WORLD):
-            return own.SE3.Identity()
-        if frame not in self._frames:
-            raise self._error(f"{asked!r} is stated in {frame!r}, which is no link, joint or frame of the model")
-        return self._pose(self._frames[frame], way)
-
-    def _own_pose(self, element: ElementTree.Element) -> own.SE3:
-        pose = element.find("pose")
-        if pose is None:
-            return own.SE3.Identity()
-        what = f"pose of {element.get('name') or element.tag}"
-        form = pose.get("rotation_format", "euler_rpy")
-        if form == "quat_xyzw":
-            values = self._numbers(pose.text or "0 0 0 0 0 0 1", 7, what)
-            length = float(np.linalg.norm(values[3:]))
-            if abs(length - 1.0) > UNIT:
-                raise self._error(f"the {what} has no unit quaternion")
-            return own.XYZQUATToSE3(np.append(values[:3], values[3:] / length))
-        if form != "euler_rpy":
-            raise self._error(f"the {what} is in {form!r}, which is none of euler_rpy, quat_xyzw")
-        values = self._numbers(pose.text or "0 0 0 0 0 0", 6, what)
-        turn = np.radians(values[3:]) if pose.get("degrees", "false") in ("true", "1") else values[3:]
-        return own.SE3(own.rpy.rpyToMatrix(*turn), values[:3])
 
     def _number(self, element: ElementTree.Element, key: str, default: float) -> float:
         text = element.findtext(key)
-        return default if text is None else float(self._numbers(text, 1, f"{key} of {element.get('name')}")[0])
-
-    def _numbers(self, text: str, count: int, what: str) -> Array:
-        try:
-            values = np.array([float(word) for word in text.split()])
-        except ValueError:
-            values = np.zeros(0)
-        if len(values) != count or np.isnan(values).any():
-            raise self._error(f"{what} is {text.strip()!r}, expected {count} numbers")
-        return values
+        what = f"{key} of {element.get('name') or element.tag}"
+        return default if text is None else float(self._frames.numbers(text, 1, what)[0])
 
     def _say(self) -> None:
-        shapes = [name for name, link in self._links.items() if link.find("collision") is not None]
+        shapes = [name for name, link in self._links.items() if link.element.find("collision") is not None]
         if shapes:
             self._remarks.add("shapes", "shapes of an SDF file are not read; with_shapes gives them")
-        others = sorted({element.tag for element in self._model} - set(_MUTE))
-        if others:
-            self._remarks.add("sdf", f"not read: {', '.join(f'<{tag}>' for tag in others)}")
+        if self._static:
+            self._remarks.add("sdf", "the model is static: its base is fixed, its joints move here")
+        check_inertias(self._tensors, self._remarks)
+        if unread := list(dict.fromkeys(self._unread(self._model, ""))):
+            self._remarks.add("sdf", f"not read: {', '.join(unread)}")
+
+    def _unread(self, element: ElementTree.Element, whose: str) -> Iterator[str]:
+        """What an element says, and what is in it, that means nothing here; ``whose``: words for the element."""
+        known = _SDF_ATTRIBUTES.get(element.tag, tuple(element.attrib))
+        yield from (
+            f"{key} in <{element.tag}>{whose}{meant(key, known)}"
+            for key in element.attrib
+            if key not in known and element.get(key)
+        )
+        times = Counter(part.tag for part in element)
+        for part in element:
+            read = _SDF_READ.get(element.tag, ())
+            owner = f" of {part.tag} {part.get('name')!r}" if part.get("name") else whose
+            if part.tag in read:
+                if times[part.tag] > 1 and part.tag not in _MANY:
+                    yield f"<{part.tag}>{whose} after the first"
+                yield from self._unread(part, owner)
+            elif part.tag not in _MUTE and (part.text or "").strip() not in _USUAL.get(part.tag, ()):
+                yield f"<{part.tag}>{whose}{meant(part.tag, read)}"
 
     def _error(self, reason: str) -> RobotFileError:
         return RobotFileError("robot", str(self._path), reason)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import pathlib
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -126,12 +126,12 @@ def check_tree(path: pathlib.Path, tree: ElementTree.Element) -> None:
 
 
 def check_links(path: pathlib.Path, tree: ElementTree.Element, remarks: Remarks) -> None:
-    """Masses are refused below 0; principal moments that no body has, a < 0 or c > a + b, are said.
+    """Masses are refused below 0, and inertias looked at.
 
     Raises:
         RobotFileError: a negative mass.
     """
-    names, tensors = list[str](), list[list[list[float]]]()
+    tensors = dict[str, Array]()
     for link in tree.findall("link"):
         name, mass, inertia = str(link.get("name")), link.find("inertial/mass"), link.find("inertial/inertia")
         if mass is None or inertia is None:
@@ -139,12 +139,16 @@ def check_links(path: pathlib.Path, tree: ElementTree.Element, remarks: Remarks)
         if number(mass, "value") < 0.0:
             raise RobotFileError("robot", str(path), f"link {name!r} has a mass of {mass.get('value')} kg")
         xx, xy, xz, yy, yz, zz = (number(inertia, key) for key in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz"))
-        names.append(name)
-        tensors.append([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    moments = np.linalg.eigvalsh(np.array(tensors).reshape(-1, 3, 3))
+        tensors[name] = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    check_inertias(tensors, remarks)
+
+
+def check_inertias(tensors: Mapping[str, Array], remarks: Remarks) -> None:
+    """Of links by name, at their centres of mass: principal moments that no body has, a < 0 or c > a + b, are said."""
+    moments = np.linalg.eigvalsh(np.array(list(tensors.values())).reshape(-1, 3, 3))
     largest = float(np.abs(moments).max(initial=0.0))
     wrong, slightly = list[str](), list[str]()
-    for name, m in zip(names, moments, strict=True):
+    for name, m in zip(tensors, moments, strict=True):
         excess = max(-m[0], m[2] - m[0] - m[1])
         if excess > MOMENT_DIGITS * np.abs(m).max():
             (wrong if excess > FELT * largest else slightly).append(f"link {name!r} {shown(m)}")
@@ -166,12 +170,12 @@ def check_elements(tree: ElementTree.Element, remarks: Remarks) -> None:
                 if several > 1:
                     remarks.add("elements", f"<{tag}>{whose} is there {several} times, the first counts")
             elif tag not in _NO_MECHANICS and not tag.startswith("{"):
-                meant = _meant(tag, read)
-                remarks.add("elements", f"not read: <{tag}>{whose}{meant}", loud=bool(meant) or element.tag != "link")
+                near = meant(tag, read)
+                remarks.add("elements", f"not read: <{tag}>{whose}{near}", loud=bool(near) or element.tag != "link")
         for part in element if element.tag == "joint" else ():
             for name in set(part.attrib) - set(_ATTRIBUTES.get(str(part.tag), part.attrib)):
-                if meant := _meant(name, _ATTRIBUTES[str(part.tag)]):
-                    remarks.add("elements", f"not read: {name} in <{part.tag}>{whose}{meant}")
+                if near := meant(name, _ATTRIBUTES[str(part.tag)]):
+                    remarks.add("elements", f"not read: {name} in <{part.tag}>{whose}{near}")
     narrower = list[str]()
     for joint in tree.findall("joint"):
         limit, soft = joint.find("limit"), joint.find("safety_controller")
@@ -185,7 +189,7 @@ def check_elements(tree: ElementTree.Element, remarks: Remarks) -> None:
         remarks.add("soft limits", text, loud=False)
 
 
-def _meant(name: str, known: Iterable[str]) -> str:
+def meant(name: str, known: Iterable[str]) -> str:
     """Which of the known names a misspelt one was meant to be, in words."""
     # Imported for a mistake only
     import difflib

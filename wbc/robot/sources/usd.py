@@ -29,10 +29,12 @@ KINDS = {
     "PhysicsSphericalJoint": "ball",
     "PhysicsFixedJoint": "fixed",
 }
-#: Applied schemas of prims that say nothing of how bodies move, by their first words
+#: Schemas that say how bodies move, of the format and of simulators, by their first words
+_OF_MOTION = ("Physics", "Physx", "Newton", "Mjc")
+#: Those that say nothing of it, or are read
 _QUIET = (
     *("PhysicsRigidBody", "PhysicsMass", "PhysicsArticulationRoot", "PhysicsCollision", "PhysicsMeshCollision"),
-    *("MaterialBinding", "PhysicsDrive", "PhysxJoint", "PhysicsJointState"),
+    *("PhysicsDrive", "PhysxJoint", "PhysicsJointState", "PhysicsScene"),
 )
 WORLD = "world"
 #: What a scene's gravity may differ by from that of models without a word [m/s^2]
@@ -54,8 +56,8 @@ def converted(path: pathlib.Path) -> pathlib.Path:
     """The SDF file of a stage, in the cache. Bodies stand where its joints at zero put them, from the root's pose on; z
     is upwards: against the gravity of the stage's scene, or else along its up axis, which is y unless it says so.
 
-    What is said of joints' limits, forces of drives, masses and inertias is there, in SI units. What else applies to a
-    body or joint, and joints that are off, are named in the log.
+    What is said of gravity, joints' limits, forces of drives, masses and inertias is there, in SI units. What else
+    applies to a body or joint, and joints that are off, are named in the log.
 
     Raises:
         MissingPackageError: usd-core is not installed.
@@ -76,13 +78,13 @@ def converted(path: pathlib.Path) -> pathlib.Path:
 
 class _Stage:
     def __init__(self, path: pathlib.Path, stage: Any) -> None:
-        from pxr import UsdGeom, UsdPhysics
+        from pxr import Usd, UsdGeom, UsdPhysics
 
         self._path, self._stage, self._physics = path, stage, UsdPhysics
         self._length = float(UsdGeom.GetStageMetersPerUnit(stage))
         self._mass = float(UsdPhysics.GetStageKilogramsPerUnit(stage))
         self._places = UsdGeom.XformCache()
-        prims = [prim for prim in stage.Traverse() if prim.IsActive()]
+        prims = [prim for prim in stage.Traverse(Usd.TraverseInstanceProxies()) if prim.IsActive()]
         bodies = [prim for prim in prims if prim.HasAPI(UsdPhysics.RigidBodyAPI)]
         if not bodies:
             raise self._error("the stage has no rigid bodies")
@@ -90,11 +92,15 @@ class _Stage:
         self._bodies = dict(zip((str(prim.GetPath()) for prim in bodies), bodies, strict=True))
         self._names = dict(zip(self._bodies, names, strict=True))
         self.lost = list[str]()
+        #: Of the stage's scene, where it is another one than that of models without a word [m/s^2]
+        self._gravity: float | None = None
         for prim in prims:
             # Those that this installation of USD does not know are in the metadata alone
             applied = prim.GetMetadata("apiSchemas")
-            named = [] if applied is None else map(str, applied.GetAddedOrExplicitItems())
-            if others := [one for one in named if one.startswith(("Physics", "Physx")) and not one.startswith(_QUIET)]:
+            named = [] if applied is None else list(map(str, applied.GetAddedOrExplicitItems()))
+            if (typed := str(prim.GetTypeName())) not in KINDS:
+                named.append(typed)
+            if others := [one for one in named if one.startswith(_OF_MOTION) and not one.startswith(_QUIET)]:
                 self.lost.append(f"{', '.join(others)} of {prim.GetName()}")
         up = np.eye(3)["XYZ".index(str(UsdGeom.GetStageUpAxis(stage)))]
         for scene in (UsdPhysics.Scene(prim) for prim in prims if prim.IsA(UsdPhysics.Scene)):
@@ -103,8 +109,8 @@ class _Stage:
                 scene.GetGravityMagnitudeAttr().Get() * self._length,
             )
             up = -down / np.linalg.norm(down) if down.any() else up
-            if most >= 0.0 and abs(most + GRAVITY) > NEAR_GRAVITY:
-                self.lost.append(f"gravity of {most:.4g} m/s^2, which is {-GRAVITY} here")
+            if 0.0 <= most < math.inf and abs(most + GRAVITY) > NEAR_GRAVITY:
+                self._gravity = most
         self._upright = own.SE3(own.Quaternion.FromTwoVectors(up, np.eye(3)[2]).toRotationMatrix(), np.zeros(3))
         joints = [prim for prim in prims if prim.IsA(UsdPhysics.Joint)]
         self._joints = [joint for prim in joints if (joint := self._joint(prim)) is not None]
@@ -112,7 +118,10 @@ class _Stage:
     def element(self) -> ElementTree.Element:
         """The stage as an SDF document."""
         sdf = ElementTree.Element("sdf", version="1.9")
-        model = ElementTree.SubElement(sdf, "model", name=self._path.stem)
+        world = ElementTree.SubElement(sdf, "world", name="scene")
+        if self._gravity is not None:
+            ElementTree.SubElement(world, "gravity").text = f"0 0 {-self._gravity!r}"
+        model = ElementTree.SubElement(world, "model", name=self._path.stem)
         for path, pose in self._standing().items():
             link = ElementTree.SubElement(model, "link", name=self._names[path])
             ElementTree.SubElement(link, "pose").text = _text(pose)

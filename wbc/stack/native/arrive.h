@@ -43,23 +43,24 @@ static void follow(wbc_tick *t, double *way) {
 
 #if CLOSING > 0
 
-/* Numbers of a column of the loops' rows from the group of four that row `from` is in */
-#define EACH_FOUR(at, from) for (int at = (from) & ~3; at < CLOSING_ROOM; at += 4)
+/* Groups of four numbers of a column of the loops' rows: all of them, as their number is known to the compiler */
+#define EACH_FOUR(at) for (int at = 0; at < CLOSING_ROOM; at += 4)
 
 /* J W J' = L D L': L by columns, then by rows, and 1 / D, which is 0 of rows that are left out, or depend on those before. W is `ease` */
 static void factor_closing(wbc_tick *t, const double *ease) {
     double *columns = t->closing_factor, *rows = columns + CLOSING * CLOSING_ROOM, square[CLOSING + 1];
     for (int c = 0; c < CLOSING; c++) {
+        four sums[CLOSING_ROOM / 4 + 1];
+        EACH_FOUR(at) sums[at / 4] = (four){0};
         /* The row has entries of its own linkage alone */
         const int first = a_start[CLOSING_FIRST + c], end = a_end[CLOSING_FIRST + c];
-        EACH_FOUR(at, c) {
-            four sum = {0};
-            for (int e = first; e < end; e++) {
-                const double *joint = t->closing_columns + a_col[e] * CLOSING_ROOM;
-                sum = MADD(EACH(ease[a_col[e]] * joint[c]), GIVEN_FOUR(joint + at), sum);
-            }
-            FOUR(columns + c * CLOSING_ROOM + at) = sum;
+        for (int e = first; e < end; e++) {
+            const double *joint = t->closing_columns + a_col[e] * CLOSING_ROOM;
+            const four each = EACH(ease[a_col[e]] * joint[c]);
+            EACH_FOUR(at) sums[at / 4] = MADD(each, GIVEN_FOUR(joint + at), sums[at / 4]);
         }
+        EACH_FOUR(at) FOUR(columns + c * CLOSING_ROOM + at) = sums[at / 4];
+        EACH_FOUR(at) FOUR(rows + c * CLOSING_ROOM + at) = (four){0};
         square[c] = columns[c * CLOSING_ROOM + c];
     }
     for (int c = 0; c < CLOSING; c++) {
@@ -69,11 +70,13 @@ static void factor_closing(wbc_tick *t, const double *ease) {
         for (int r = c + 1; r < CLOSING; r++) {
             const double share = rows[r * CLOSING_ROOM + c] = own[r] * inverse;
             double *other = columns + r * CLOSING_ROOM;
-            EACH_FOUR(at, r) FOUR(other + at) -= EACH(share) * GIVEN_FOUR(own + at);
+            if (share == 0.0) continue;
+            EACH_FOUR(at) FOUR(other + at) -= EACH(share) * GIVEN_FOUR(own + at);
         }
-        EACH_FOUR(at, c) FOUR(own + at) *= EACH(inverse);
-        for (int r = c & ~3; r <= c; r++) own[r] = 0.0;
-        for (int r = c; r < CLOSING_ROOM; r++) rows[c * CLOSING_ROOM + r] = 0.0;
+        EACH_FOUR(at) {
+            const four_bits behind = PLACES(at) > (four_bits){c, c, c, c};
+            FOUR(own + at) = (four)((four_bits)(EACH(inverse) * GIVEN_FOUR(own + at)) & behind);
+        }
     }
 }
 
@@ -81,13 +84,13 @@ static void factor_closing(wbc_tick *t, const double *ease) {
 static void shortest_change(const wbc_tick *t, const double *ease, double *e, double *change) {
     const double *columns = t->closing_factor, *rows = columns + CLOSING * CLOSING_ROOM;
     for (int c = 0; c < CLOSING; c++)
-        EACH_FOUR(at, c) FOUR(e + at) -= EACH(e[c]) * GIVEN_FOUR(columns + c * CLOSING_ROOM + at);
+        EACH_FOUR(at) FOUR(e + at) -= EACH(e[c]) * GIVEN_FOUR(columns + c * CLOSING_ROOM + at);
     for (int c = 0; c < CLOSING; c++) e[c] *= t->closing_inverse[c];
     for (int c = CLOSING - 1; c > 0; c--)
-        for (int at = 0; at < c; at += 4) FOUR(e + at) -= EACH(e[c]) * GIVEN_FOUR(rows + c * CLOSING_ROOM + at);
+        EACH_FOUR(at) FOUR(e + at) -= EACH(e[c]) * GIVEN_FOUR(rows + c * CLOSING_ROOM + at);
     for (int j = 0; j < DOFS; j++) {
         four sum = {0};
-        EACH_FOUR(at, 0) sum = MADD(GIVEN_FOUR(t->closing_columns + j * CLOSING_ROOM + at), GIVEN_FOUR(e + at), sum);
+        EACH_FOUR(at) sum = MADD(GIVEN_FOUR(t->closing_columns + j * CLOSING_ROOM + at), GIVEN_FOUR(e + at), sum);
         change[j] = -ease[j] * SUM_OF_FOUR(sum);
     }
 }
@@ -95,7 +98,7 @@ static void shortest_change(const wbc_tick *t, const double *ease, double *e, do
 /* e = J v; the largest of rows that corrections have, in units of rows */
 static double open_rate(const wbc_tick *t, const double *v, double *e) {
     double most = 0.0;
-    EACH_FOUR(at, 0) {
+    EACH_FOUR(at) {
         four sum = {0};
         for (int j = 0; j < DOFS; j++) sum = MADD(GIVEN_FOUR(t->closing_columns + j * CLOSING_ROOM + at), EACH(v[j]), sum);
         FOUR(e + at) = sum;

@@ -24,6 +24,8 @@
 /* A joint that moves at this rate and moved at it the other way in the last tick turns round [rad, or characteristic lengths, per
  * second]: where rows bend it is not their tasks that want it */
 #define TURNING 1.0
+/* A tick that moves the joints of a row by no more in all bends it in the second order [rad, or characteristic lengths] */
+#define SHORT 0.2
 
 #if BENDING > 0
 /* By how much what rows keep changes until q (+) v dt, into `lost_there`. That of one v is asked for again and again, and evaluated
@@ -50,6 +52,11 @@ static void lose(wbc_tick *t, const double *v) {
 #endif
 
 #if BENDING > 0
+/* `most` to the size of x in units of row k, where that is larger; divided only then */
+INLINE void raise_per_unit(double *most, double x, int k) {
+    if (fabs(x) > *most * row_scale[k]) *most = fabs(x) / row_scale[k];
+}
+
 /* Whether loops are open at q, and their rows close them: those that are left out close with these, at rates of their own */
 static int closes_loops(const wbc_tick *t) {
     int open = 0;
@@ -71,12 +78,12 @@ EXPORT double wbc_tick_find_lost(wbc_tick *t, int all) {
         if (all) t->report.lost[k] = 0.0;
         if (looks && bent[k] && t->left_out[k] && isfinite(t->lost_there[k])) {
             t->report.lost[k] = t->lost_there[k] - t->left_side[k] * t->dt;
-            worst = larger(worst, fabs(t->report.lost[k]) / row_scale[k]);
+            raise_per_unit(&worst, t->report.lost[k], k);
         }
         if (!bent[k] || t->free_low[k] != t->free_high[k] || !isfinite(t->lost_there[k])) continue;
         /* What the rate says cancels where all is asked for */
         t->report.lost[k] = all ? t->lost_there[k] + (t->bend[k] - t->free_low[k]) * t->dt : t->report.lost[k] + t->bend[k] * t->dt;
-        worst = larger(worst, fabs(t->report.lost[k]) / row_scale[k]);
+        raise_per_unit(&worst, t->report.lost[k], k);
     }
     return worst / t->dt;
 #else
@@ -91,7 +98,7 @@ EXPORT double wbc_tick_find_lost(wbc_tick *t, int all) {
 static double bent_by(const wbc_tick *t, double worst, double most) {
     double opened = 0.0;
     for (int k = 0; k < MC; k++)
-        if (bent[k] == 2) opened = larger(opened, fabs(t->report.lost[k]) / row_scale[k]);
+        if (bent[k] == 2) raise_per_unit(&opened, t->report.lost[k], k);
     return larger(worst / BENDS, opened / most);
 }
 #endif
@@ -134,13 +141,34 @@ static void bend_rows(wbc_tick *t, const double *bend) {
     own_sides(t);
 }
 
+/* By how much exact rows bend at the last command, without an evaluation: what led here kept them where it began, so on the way back they
+ * lose what their rates say here, and on the way on as much in the second order. 0 where that is more than such a motion of their
+ * joints can bend them by, so that they were not kept, or where it is long. */
+static int bends_as_before(const wbc_tick *t, double *guess) {
+    for (int k = 0; k < MC; k++) {
+        double rate = 0.0, length = 0.0;
+        guess[k] = 0.0;
+        if (bent[k] != 2 || t->free_low[k] != t->free_high[k]) continue;
+        for (int e = a_start[k]; e < a_end[k]; e++) {
+            const double v = t->v_last[a_col[e]];
+            rate += t->at[e] * v;
+            length += fabs(v) / dof_scale[a_col[e]] * t->dt;
+        }
+        guess[k] = rate * t->dt;
+        if (!(length <= SHORT && fabs(guess[k]) <= 0.5 * length * length * row_scale[k])) return 0;
+    }
+    return 1;
+}
+
 /* Exact rows make up for what they would lose at the last command, which this one is near to; before the first search */
 static void foresee(wbc_tick *t) {
+    double guess[MC + 1];
     if (!has_exact_rows()) return;
-    lose(t, t->v_last);
+    const int known = bends_as_before(t, guess);
+    if (!known) lose(t, t->v_last);
     for (int k = 0; k < MC; k++) {
         if (bent[k] != 2 || t->free_low[k] != t->free_high[k]) continue;
-        bend_row(t, k, -t->report.lost[k] / t->dt);
+        bend_row(t, k, -(known ? guess[k] : t->report.lost[k]) / t->dt);
         t->low[NV + k] = t->high[NV + k] = t->free_low[k];
     }
     if (t->prepared && !t->reduced) right_side(t);
@@ -171,14 +199,15 @@ static int same_rows(const wbc_tick *t) {
 
 /* The same where equality rows are taken out: the sides of exact ones, by what they lose */
 static int bend_reduced(wbc_tick *t, double share) {
-    double change[WIDE], opened = 0.0;
+    double change[WIDE];
+    int open = 0;
     wbc_tick_find_lost(t, 1);
     for (int n = 0; n < t->reduced; n++) {
         const int k = t->equal_row[n];
         change[n] = bent[k] == 2 ? share * t->report.lost[k] / t->dt : 0.0;
-        if (bent[k] == 2) opened = larger(opened, fabs(t->report.lost[k]) / row_scale[k]);
+        open |= bent[k] == 2 && fabs(t->report.lost[k]) > EXACT * row_scale[k];
     }
-    if (opened <= EXACT) return 0;
+    if (!open) return 0;
     for (int n = 0; n < t->reduced; n++) {
         const int k = t->equal_row[n];
         if (change[n] == 0.0) continue;

@@ -304,15 +304,14 @@ static void choose_pivots(wbc_tick *t, const wbc_pivots *chosen) {
             FOUR(t->R + i * WIDE + at) = GIVEN_FOUR(t->H + i * WIDE + at) * EACH(chosen->scale[i]) * GIVEN_FOUR(chosen->scale + at);
     for (int k = 0; k < NV; k++) {
         const double *own = t->R + k * WIDE, given = own[k], unit = chosen->scale[k];
-        const four_bits behind = PLACES(k & ~3) > (four_bits){k, k, k, k};
-        four most = (four)((four_bits)SIZE_OF_FOUR(GIVEN_FOUR(own + (k & ~3))) & behind);
+        four most = SIZE_OF_FOUR(BEHIND(GIVEN_FOUR(own + (k & ~3)), k & 3));
         for (int at = (k & ~3) + 4; at < WIDE; at += 4) RAISE_FOUR(most, SIZE_OF_FOUR(GIVEN_FOUR(own + at)));
         const double aside = larger(larger(most[0], most[2]), larger(most[1], most[3])), needed = aside * aside * inverse_bound;
         const double pivot = given >= chosen->least && given >= needed ? given : larger(larger(fabs(given), needed), chosen->least);
         chosen->more[k] = (pivot - given) / (unit * unit);
         const double reciprocal = 1.0 / pivot;
         for (int i = k + 1; i < NV; i++) {
-            if (own[i] == 0.0) continue;
+            if (is_zero(own + i)) continue;
             const four share = EACH(-own[i] * reciprocal);
             double *row = t->R + i * WIDE;
             for (int at = i & ~3; at < WIDE; at += 4) FOUR(row + at) = MADD(share, GIVEN_FOUR(own + at), GIVEN_FOUR(row + at));

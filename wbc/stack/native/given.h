@@ -22,23 +22,22 @@ static int find_equalities(wbc_tick *t) {
 }
 
 /* The first `count` of them, of length one, as columns of WIDE numbers; 0 where one has no length */
-static int unit_rows(wbc_tick *t, int count) {
+INLINE int unit_rows(wbc_tick *t, int count) {
+    double scale[WIDE] = {0};
     for (int j = 0; j < NV; j++)
         for (int i = 0; i < count; i += 4) FOUR(t->equal + j * WIDE + i) = (four){0};
     for (int n = 0; n < count; n++) {
         const int k = t->equal_row[n];
-        double even = 0.0, odd = 0.0;
-        int e = a_start[k];
-        for (; e + 1 < a_end[k]; e += 2) {
-            const double a = t->at[e] * dof_scale[a_col[e]], b = t->at[e + 1] * dof_scale[a_col[e + 1]];
-            even += a * a;
-            odd += b * b;
+        double square = 0.0;
+        for (int e = a_start[k]; e < a_end[k]; e++) {
+            const double entry = t->equal[a_col[e] * WIDE + n] = t->at[e] * dof_scale[a_col[e]];
+            square += entry * entry;
         }
-        if (e < a_end[k]) even += t->at[e] * dof_scale[a_col[e]] * (t->at[e] * dof_scale[a_col[e]]);
-        if (!(even + odd > DEAD)) return 0;
-        const double scale = t->equal_scale[n] = 1.0 / sqrt(even + odd);
-        for (e = a_start[k]; e < a_end[k]; e++) t->equal[a_col[e] * WIDE + n] = t->at[e] * dof_scale[a_col[e]] * scale;
+        if (!(square > DEAD)) return 0;
+        t->equal_scale[n] = scale[n] = 1.0 / sqrt(square);
     }
+    for (int j = 0; j < NV; j++)
+        for (int i = 0; i < count; i += 4) FOUR(t->equal + j * WIDE + i) *= GIVEN_FOUR(scale + i);
     return 1;
 }
 
@@ -67,10 +66,9 @@ INLINE int give(double *columns, int total, int j, int count, double least, doub
         FOUR(own + i) = part + one;
         FOUR(open + i) = (four)((four_bits)GIVEN_FOUR(open + i) & ~here);
     }
-    for (int c = 0; c < total; c++) {
-        double *column = columns + c * WIDE;
+    for (double *column = columns, *end = columns + total * WIDE; column < end; column += WIDE) {
+        if (is_zero(column + which) || column == own) continue;
         const double f = column[which];
-        if (f == 0.0 || c == j) continue;
         for (int i = 0; i < count; i += 4) FOUR(column + i) = MADD(EACH(f), GIVEN_FOUR(share + i), GIVEN_FOUR(column + i));
     }
     given[which] = j;

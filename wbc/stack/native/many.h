@@ -104,12 +104,17 @@ EXPORT int wbc_tick_many(wbc_tick *t, wbc_shared *s, const wbc_given *given, int
     return 2;
 }
 
-/* H, g, A and the bounds of the QP of each robot at its inputs, as they stand in memory */
-EXPORT void wbc_tick_qp_many(wbc_tick *t, long long count, const double *inputs, double *problems) {
+/* H, g, A and the bounds of the QP of each robot at its inputs, as they stand in memory; where `tasks` is given, J, desired rates
+ * and weights of the task rows [MT, NV], [MT], [MT] */
+EXPORT void wbc_tick_qp_many(wbc_tick *t, long long count, const double *inputs, double *problems, double *tasks) {
     for (long long k = 0; k < count; k++) {
         memcpy(t->q, (const char *)inputs + k * (long long)INPUT_SIZE, INPUT_SIZE);
         wbc_tick_assemble(t);
         memcpy((char *)problems + k * (long long)PROBLEM_SIZE, t->H, PROBLEM_SIZE);
+        if (!tasks) continue;
+        double *J = tasks + k * MT * (NV + 2LL), *desired = J + MT * NV, *weight = desired + MT;
+        wbc_tick_task_rows(t, J);
+        for (int r = 0; r < MT; r++) desired[r] = t->desired[r], weight[r] = t->weight[r] * t->report.factor[r];
     }
 }
 

@@ -119,16 +119,20 @@ static int give_mirrored(wbc_tick *t, int count) {
         t->given[t->rest_slot[s]] = variable[given[s]];
         t->moved[s] = given[s];
     }
-    for (int i = 0; i < NV; i++) {
-        double *row = t->basis + i * WIDE;
-        const double *own = motions + i * FREEDOMS;
-        for (int at = 0; at < THIN; at += 4) {
-            four sum = {own[kept[at]], own[kept[at + 1]], own[kept[at + 2]], own[kept[at + 3]]};
-            for (int s = 0; s < t->rest; s++) sum -= EACH(own[given[s]]) * GIVEN_FOUR(follow + s * THIN + at);
-            FOUR(row + at) = sum;
+    for (int s = 0; s < t->rest; s++)
+        for (int i = 0; i < NV; i++) t->lifted[s * WIDE + i] = motions[i * FREEDOMS + given[s]];
+    for (int at = 0; at < THIN; at += 4) {
+        const double *own[4];
+        for (int r = 0; r < 4; r++) own[r] = motions + kept[at + r];
+        const four_bits known = PLACES(at) < (four_bits){width, width, width, width};
+        for (int i = 0; i < NV; i++) {
+            const four row = {own[0][i * FREEDOMS], own[1][i * FREEDOMS], own[2][i * FREEDOMS], own[3][i * FREEDOMS]};
+            FOUR(t->basis + i * WIDE + at) = (four)((four_bits)row & known);
         }
-        for (int w = width; w < THIN; w++) row[w] = 0.0;
-        for (int s = 0; s < t->rest; s++) t->lifted[s * WIDE + i] = own[given[s]];
+        for (int s = 0; s < t->rest; s++) {
+            const four each = GIVEN_FOUR(follow + s * THIN + at);
+            for (int i = 0; i < NV; i++) FOUR(t->basis + i * WIDE + at) -= EACH(t->lifted[s * WIDE + i]) * each;
+        }
     }
     t->width = width;
     return 1;
@@ -151,7 +155,7 @@ INLINE void by_rows_mirrored(const wbc_tick *t, const double *e, double *x, int 
     for (int n = FORCES; n < t->reduced; n++) {
         const int k = t->equal_row[n];
         gap[n - FORCES] = sizes ? e[n] : -e[n];
-        for (int m = a_start[k]; m < a_end[k]; m++) gap[n - FORCES] += SIGNED(t->at[m]) * x[a_col[m]];
+        for (int m = a_start[k]; m < a_end[k] && a_col[m] < DOFS; m++) gap[n - FORCES] += SIGNED(t->at[m]) * x[a_col[m]];
     }
     for (int i = 0; i < FORCES; i++) push[i] = gap[t->torque_slot[t->given[i]] - FORCES] * dof_scale[t->given[i]];
     for (int k = 0; k < FORCES; k++) {

@@ -91,7 +91,7 @@ INLINE double along(const wbc_tick *t, int k, const double *v) {
 static void solve_with(const wbc_tick *t, const double *b, double *x) {
     double y[WIDE];
     if (REDUCES && t->reduced) {
-        solve_reduced(t, b, x);
+        solve_reduced(t, t->reduced_inverse, b, x);
         return;
     }
     memcpy(y, b, sizeof y);
@@ -159,8 +159,8 @@ static void find_pivots(const wbc_tick *t, double *least, double *most) {
     double pivot[NV];
     *least = WBC_INF, *most = 0.0;
     for (int a = 0; REDUCES && t->reduced && a < t->width; a++) {
-        *least = smaller(*least, t->reduced_pivot[a]);
-        *most = larger(*most, t->reduced_pivot[a]);
+        *least = smaller(*least, t->reduced_R[a * WIDE + a]);
+        *most = larger(*most, t->reduced_R[a * WIDE + a]);
     }
     if (REDUCES && t->reduced) return;
     for (int i = 0; i < NV; i++) pivot[i] = dof_scale[i] / t->inverse_diagonal[i];
@@ -305,7 +305,7 @@ static int add_curvature(wbc_tick *t, const double *free, const double *error, c
     if (length <= TRUSTED) return 1;
     const double more = held_short(slope, length);
     for (int i = 0; i < NV; i++) t->H[i * WIDE + i] += more / (dof_scale[i] * dof_scale[i]);
-    t->prepared = REDUCES && t->reduced ? stiffen_reduced(t, more, 1) : factor(t);
+    t->prepared = REDUCES && t->reduced ? stiffen_reduced(t, more) : factor(t);
     return 1;
 }
 

@@ -28,6 +28,7 @@ INLINE int gives(wbc_tick *t, int j, int count, double least, double *open) {
 INLINE int give_all(wbc_tick *t, int count) {
     double open[WIDE];
     int step = 0, late[WIDE] = {0};
+    if (!unit_rows(t, count)) return 0;
     for (int i = 0; i < WIDE; i++) open[i] = 0.0;
     for (int i = 0; i < count; i++) open[i] = !(late[i] = late_row[t->equal_row[i]]);
     for (int j = 0; j < NV; j++) t->is_given[j] = 0;
@@ -49,7 +50,7 @@ static int eliminate(wbc_tick *t) {
     t->mirrored = FORCES > 0 && give_mirrored(t, count);
     if (t->mirrored) return count;
     /* The usual number is known to the compiler */
-    const int ok = count > 0 && unit_rows(t, count) && (count == REDUCED ? give_all(t, REDUCED) : give_all(t, count));
+    const int ok = count > 0 && (count == REDUCED ? give_all(t, REDUCED) : give_all(t, count));
     for (int j = 0; ok && j < NV; j++)
         if (!t->is_given[j]) t->left[left++] = j;
     t->width = left;
@@ -86,47 +87,30 @@ static int same_equalities(const wbc_tick *t) {
 /* Loops over the rows that were taken out, in groups of four */
 #define EACH_ROW_GROUP(t, i) for (int i = 0; i < (t)->reduced; i += 4)
 
-/* e of rows per row of length one, 0 behind the last */
-static void scale_rows(const wbc_tick *t, double *e) {
-    for (int k = 0; k < t->reduced; k++) e[k] *= t->equal_scale[k];
-    for (int k = t->reduced; k < WIDE; k++) e[k] = 0.0;
+/* out = the first `count` columns of P times e, or their sizes */
+INLINE void sum_columns(const wbc_tick *t, int count, const double *e, int sizes, double *out) {
+    for (int k = 0; k < count; k++) {
+        const double *column = COLUMN(t, k);
+        const four each = EACH(e[k]);
+        for (int i = 0; i < count; i += 4) {
+            const four part = sizes ? SIZE_OF_FOUR(GIVEN_FOUR(column + i)) : GIVEN_FOUR(column + i);
+            FOUR(out + i) = MADD(each, part, FOUR(out + i));
+        }
+    }
 }
 
-static void spread_given(const wbc_tick *t, const double *e, double *x) {
+/* x = P e: the variables that were given, for rows that are e, the others 0; of `sizes` no |P e| is larger where |e| are at most these */
+static void by_rows(const wbc_tick *t, const double *e, double *x, int sizes) {
+    double moved[WIDE] = {0}, unit[WIDE];
+    if (FORCES > 0 && t->mirrored) {
+        by_rows_mirrored(t, e, x, sizes);
+        return;
+    }
+    for (int k = 0; k < t->reduced; k++) unit[k] = e[k] * t->equal_scale[k];
+    if (t->reduced == REDUCED) sum_columns(t, REDUCED, unit, sizes, moved);
+    else sum_columns(t, t->reduced, unit, sizes, moved);
     for (int i = 0; i < WIDE; i++) x[i] = 0.0;
-    for (int k = 0; k < t->reduced; k++) x[t->given[k]] = e[k] * dof_scale[t->given[k]];
-}
-
-/* x = P e: the variables that were given, for rows that are e, the others 0; `e`, of WIDE numbers, is changed */
-static void by_rows(const wbc_tick *t, double *e, double *x) {
-    double moved[WIDE] = {0};
-    if (FORCES > 0 && t->mirrored) {
-        by_rows_mirrored(t, e, x, 0);
-        return;
-    }
-    scale_rows(t, e);
-    EACH_ROW_GROUP(t, i) {
-        four sum = {0};
-        for (int k = 0; k < t->reduced; k++) sum = MADD(EACH(e[k]), GIVEN_FOUR(COLUMN(t, k) + i), sum);
-        FOUR(moved + i) = sum;
-    }
-    spread_given(t, moved, x);
-}
-
-/* The same of sizes: no |P e| is larger where |e| are at most these */
-static void size_by_rows(const wbc_tick *t, double *e, double *x) {
-    double moved[WIDE] = {0};
-    if (FORCES > 0 && t->mirrored) {
-        by_rows_mirrored(t, e, x, 1);
-        return;
-    }
-    scale_rows(t, e);
-    EACH_ROW_GROUP(t, i) {
-        four sum = {0};
-        for (int k = 0; k < t->reduced; k++) sum = MADD(EACH(e[k]), SIZE_OF_FOUR(GIVEN_FOUR(COLUMN(t, k) + i)), sum);
-        FOUR(moved + i) = sum;
-    }
-    spread_given(t, moved, x);
+    for (int k = 0; k < t->reduced; k++) x[t->given[k]] = moved[k] * dof_scale[t->given[k]];
 }
 
 /* Multipliers, of WIDE numbers, of the rows that leave nothing of a force `r` on the variables that were given: r + E' lambda = 0
@@ -146,101 +130,136 @@ static void multipliers_of(const wbc_tick *t, const double *r, double *lambda) {
     for (int k = t->reduced; k < WIDE; k++) lambda[k] = 0.0;
 }
 
-/* `count` rows of H Z from i on, at most four, columns from `at` on */
-INLINE void some_products(wbc_tick *t, int i, int count, int at) {
-    const double *basis = t->basis + at;
-    four sum[4] = {{0}};
-    for (int j = 0; j < i; j++)
-        for (int r = 0; r < count; r++) sum[r] = MADD(EACH(t->H[j * WIDE + i + r]), GIVEN_FOUR(basis + j * WIDE), sum[r]);
-    for (int j = i; j < i + count; j++)
-        for (int r = 0; r < count; r++) {
-            const double h = j < i + r ? t->H[j * WIDE + i + r] : t->H[(i + r) * WIDE + j];
-            sum[r] = MADD(EACH(h), GIVEN_FOUR(basis + j * WIDE), sum[r]);
-        }
-    for (int j = i + count; j < NV; j++)
-        for (int r = 0; r < count; r++) sum[r] = MADD(EACH(t->H[(i + r) * WIDE + j]), GIVEN_FOUR(basis + j * WIDE), sum[r]);
-    for (int r = 0; r < count; r++) FOUR(t->product_of_basis + (i + r) * WIDE + at) = sum[r];
+/* Whether any of four entries, or of those below them in the four rows of H, is not 0: limbs share none that no task or loop joins */
+INLINE int any_entries(const double *entry, int rows) {
+    four_bits any = {0};
+    for (int r = 0; r < rows; r++) any |= (four_bits)GIVEN_FOUR(entry + r * WIDE);
+    return (any[0] | any[1] | any[2] | any[3]) != 0;
 }
 
-/* Entries of four columns from `at` on that are right of column a */
-#define BEHIND(x, at, a) ((four)((four_bits)(x) & (PLACES(at) > (four_bits){(a), (a), (a), (a)})))
+/* p, q += f times eight columns of a row, or, not `both`, four */
+INLINE void add_columns(four *p, four *q, const double *row, double f, int both) {
+    const four each = EACH(f);
+    *p = MADD(each, GIVEN_FOUR(row), *p);
+    if (both) *q = MADD(each, GIVEN_FOUR(row + 4), *q);
+}
 
-/* R^-1 of R'R = `gram`, and the squares of R's pivots; 0 where it is not positive definite. Rows wait for reciprocals of pivots only,
- * not for their roots. */
-static int invert_gram(wbc_tick *t) {
-    double *inverse = t->reduced_inverse, row[WIDE] = {0}, roots[WIDE] = {0};
-    for (int a = 0; a < t->width; a++)
-        for (int at = 0; at < THIN; at += 4) {
-            FOUR(t->reduced_R + a * WIDE + at) = GIVEN_FOUR(t->gram + a * WIDE + at);
-            FOUR(inverse + a * WIDE + at) = (four){0};
+/* `count` rows of H Z from i on, at most four, columns from `at` on, eight of them at most */
+INLINE void some_products(wbc_tick *t, int i, int count, int at) {
+    const int both = at + 4 < THIN;
+    const double *basis = t->basis + at, *own = t->H + i * WIDE;
+    four p[4] = {{0}}, q[4] = {{0}};
+    for (int j = 0; j < i; j++) {
+        const double *h = t->H + j * WIDE + i;
+        if (!any_entries(h, 1)) continue;
+        for (int r = 0; r < count; r++) add_columns(p + r, q + r, basis + j * WIDE, h[r], both);
+    }
+    for (int j = i; j < i + count; j++)
+        for (int r = 0; r < count; r++) add_columns(p + r, q + r, basis + j * WIDE, j < i + r ? own[(j - i) * WIDE + i + r] : own[r * WIDE + j], both);
+    for (int group = i + count; group < NV; group += 4) {
+        if (!any_entries(own + group, count)) continue;
+        for (int j = group; j < NV && j < group + 4; j++)
+            for (int r = 0; r < count; r++) add_columns(p + r, q + r, basis + j * WIDE, own[r * WIDE + j], both);
+    }
+    for (int r = 0; r < count; r++) {
+        FOUR(t->product_of_basis + (i + r) * WIDE + at) = p[r];
+        if (both) FOUR(t->product_of_basis + (i + r) * WIDE + at + 4) = q[r];
+    }
+}
+
+/* The upper triangle of Z'X, of X = H Z or another symmetric matrix times Z, by groups of four */
+INLINE void form_gram(const wbc_tick *t, const double *product, double *gram) {
+    for (int a = 0; a < t->width; a += 4)
+        for (int at = a; at < THIN; at += 8) {
+            const int both = at + 4 < THIN;
+            four p[4] = {{0}}, q[4] = {{0}};
+            for (int n = 0; n < t->reduced; n++) {
+                const double *own = t->basis + t->given[n] * WIDE + a, *there = product + t->given[n] * WIDE + at;
+                for (int r = 0; r < 4; r++) add_columns(p + r, q + r, there, own[r], both);
+            }
+            /* The variable that is left is itself */
+            for (int r = 0; r < 4 && a + r < t->width; r++) {
+                const int b = a + r;
+                add_columns(p + r, q + r, product + t->left[b] * WIDE + at, dof_scale[t->left[b]], both);
+                FOUR(gram + b * WIDE + at) = p[r];
+                if (both) FOUR(gram + b * WIDE + at + 4) = q[r];
+            }
         }
-    for (int a = 0; a < t->width; a++) {
-        const double *own = t->reduced_R + a * WIDE, pivot = t->reduced_pivot[a] = own[a], reciprocal = 1.0 / pivot;
+}
+
+/* R^-1 of R'R = `gram`, whose upper triangle becomes R without the roots of its pivots, on its diagonal; 0 where it is not positive
+ * definite. Rows wait for reciprocals of pivots only, not for their roots. */
+INLINE int invert(double *gram, int width, double *inverse) {
+    double row[WIDE] = {0}, roots[WIDE] = {0};
+    for (int a = 0; a < width; a++)
+        for (int at = 0; at < THIN; at += 4) FOUR(inverse + a * WIDE + at) = (four){0};
+    for (int a = 0; a < width; a++) {
+        const double *own = gram + a * WIDE, pivot = own[a], reciprocal = -1.0 / pivot;
         if (!(pivot > 0.0)) return 0;
         roots[a] = 1.0 / sqrt(pivot);
         inverse[a * WIDE + a] = 1.0;
         /* Groups that have entries right of the pivot */
         for (int at = (a + 1) & ~3; at < THIN; at += 4) {
-            FOUR(row + at) = BEHIND(GIVEN_FOUR(own + at), at, a) * EACH(-reciprocal);
-            for (int b = a + 1; b < t->width; b++) {
-                double *other = t->reduced_R + b * WIDE + at;
+            const four part = GIVEN_FOUR(own + at) * EACH(reciprocal);
+            FOUR(row + at) = at > a ? part : BEHIND(part, a & 3);
+        }
+        for (int b = a + 1; b < width; b++)
+            for (int at = b & ~3; at < THIN; at += 4) {
+                double *other = gram + b * WIDE + at;
                 FOUR(other) = MADD(EACH(own[b]), GIVEN_FOUR(row + at), GIVEN_FOUR(other));
             }
-            for (int c = 0; c <= a; c++) {
+        for (int c = 0; c <= a; c++)
+            for (int at = (a + 1) & ~3; at < THIN; at += 4) {
                 double *other = inverse + c * WIDE + at;
                 FOUR(other) = MADD(EACH(inverse[c * WIDE + a]), GIVEN_FOUR(row + at), GIVEN_FOUR(other));
             }
-        }
     }
-    for (int a = 0; a < t->width; a++)
-        for (int at = 0; at < THIN; at += 4) FOUR(inverse + a * WIDE + at) *= GIVEN_FOUR(roots + at);
+    for (int a = 0; a < width; a++)
+        for (int at = a & ~3; at < THIN; at += 4) FOUR(inverse + a * WIDE + at) *= GIVEN_FOUR(roots + at);
     return 1;
 }
 
-/* Columns a to a + 3 of the rows of Z that are given times those of `other`, columns from `at` on, added to `sum` */
-INLINE void given_products(const wbc_tick *t, int a, const double *other, int at, four *sum) {
-    for (int n = 0; n < t->reduced; n++) {
-        const int i = t->given[n] * WIDE;
-        const double *own = t->basis + i + a;
-        const four there = GIVEN_FOUR(other + i + at);
-        for (int r = 0; r < 4; r++) sum[r] = MADD(EACH(own[r]), there, sum[r]);
-    }
+/* The factor of `gram` as its inverse. The usual number of variables is known to the compiler. */
+static int factor_gram(const wbc_tick *t, double *gram, double *inverse) {
+    return t->width == NV - REDUCED ? invert(gram, NV - REDUCED, inverse) : invert(gram, t->width, inverse);
+}
+
+INLINE void copy_columns(const wbc_tick *t, const double *from, double *to) {
+    for (int a = 0; a < t->width; a++)
+        for (int at = a & ~3; at < THIN; at += 4) FOUR(to + a * WIDE + at) = GIVEN_FOUR(from + a * WIDE + at);
 }
 
 /* The factor of Z'HZ = R'R, as its inverse; 0 where it is not positive definite */
 static int factor_reduced(wbc_tick *t) {
-    for (int at = 0; at < THIN; at += 4) {
+    for (int at = 0; at < THIN; at += 8) {
         for (int i = 0; i + 4 <= NV; i += 4) some_products(t, i, 4, at);
         if (NV % 4) some_products(t, NV / 4 * 4, NV % 4, at);
-        for (int a = 0; a < t->width; a += 4) {
-            four sum[4] = {{0}};
-            given_products(t, a, t->product_of_basis, at, sum);
-            /* The variable that is left is itself */
-            for (int b = a; b < a + 4 && b < t->width; b++)
-                FOUR(t->gram + b * WIDE + at) = MADD(EACH(dof_scale[t->left[b]]), GIVEN_FOUR(t->product_of_basis + t->left[b] * WIDE + at), sum[b - a]);
-        }
     }
-    return invert_gram(t);
+    form_gram(t, t->product_of_basis, t->gram);
+    copy_columns(t, t->gram, t->reduced_R);
+    return factor_gram(t, t->reduced_R, t->reduced_inverse);
 }
 
-/* The same of H + more / dof_scale^2, from that of H, for solve_reduced; `stays`: H Z follows, as for all that comes later */
-static int stiffen_reduced(wbc_tick *t, double more, int stays) {
-    double stiff[REDUCED_NV * WIDE + 1];
+/* `stiff` = more D^-2 Z and `gram` = Z'HZ + Z' stiff, D the units of the variables */
+INLINE void stiffened(const wbc_tick *t, double more, double *stiff, double *gram) {
     for (int i = 0; i < NV; i++) {
-        const double each = more / (dof_scale[i] * dof_scale[i]);
-        for (int at = 0; at < THIN; at += 4) {
-            FOUR(stiff + i * WIDE + at) = EACH(each) * GIVEN_FOUR(t->basis + i * WIDE + at);
-            if (stays) FOUR(t->product_of_basis + i * WIDE + at) += GIVEN_FOUR(stiff + i * WIDE + at);
-        }
+        const four each = EACH(more / (dof_scale[i] * dof_scale[i]));
+        for (int at = 0; at < THIN; at += 4) FOUR(stiff + i * WIDE + at) = each * GIVEN_FOUR(t->basis + i * WIDE + at);
     }
-    for (int at = 0; at < THIN; at += 4)
-        for (int a = 0; a < t->width; a += 4) {
-            four sum[4] = {{0}};
-            given_products(t, a, stiff, at, sum);
-            for (int b = a; b < a + 4 && b < t->width; b++) FOUR(t->gram + b * WIDE + at) += sum[b - a];
-        }
-    for (int a = 0; a < t->width; a++) t->gram[a * WIDE + a] += more;
-    return invert_gram(t);
+    form_gram(t, stiff, gram);
+    for (int a = 0; a < t->width; a++)
+        for (int at = a & ~3; at < THIN; at += 4) FOUR(gram + a * WIDE + at) += GIVEN_FOUR(t->gram + a * WIDE + at);
+}
+
+/* The factor of H + more / D^2, from that of H; H Z follows */
+static int stiffen_reduced(wbc_tick *t, double more) {
+    double stiff[REDUCED_NV * WIDE + 1], gram[REDUCED_NV * WIDE + 1];
+    stiffened(t, more, stiff, gram);
+    for (int i = 0; i < NV; i++)
+        for (int at = 0; at < THIN; at += 4) FOUR(t->product_of_basis + i * WIDE + at) += GIVEN_FOUR(stiff + i * WIDE + at);
+    copy_columns(t, gram, t->gram);
+    copy_columns(t, gram, t->reduced_R);
+    return factor_gram(t, t->reduced_R, t->reduced_inverse);
 }
 
 /* out += rows' f, of NV rows */
@@ -258,10 +277,10 @@ INLINE void add_rows(const double *rows, const double *f, double *out) {
 }
 
 /* out = R^-T z */
-static void reduced_transposed(const wbc_tick *t, const double *z, double *out) {
+INLINE void reduced_transposed(const wbc_tick *t, const double *inverse, const double *z, double *out) {
     for (int at = 0; at < THIN; at += 4) {
         four sum = {0};
-        for (int a = 0; a < t->width; a++) sum = MADD(EACH(z[a]), GIVEN_FOUR(t->reduced_inverse + a * WIDE + at), sum);
+        for (int a = 0; a < t->width && a < at + 4; a++) sum = MADD(EACH(z[a]), GIVEN_FOUR(inverse + a * WIDE + at), sum);
         FOUR(out + at) = sum;
     }
 }
@@ -269,40 +288,26 @@ static void reduced_transposed(const wbc_tick *t, const double *z, double *out) 
 /* y = R^-T Z'(H x + b), where x is 0 but for the variables that were given, and b may be none */
 static void reduced_forces(const wbc_tick *t, const double *x, const double *b, double *y) {
     double z[WIDE] = {0};
-    for (int at = 0; at < THIN; at += 4) {
-        four sum = {0};
-        for (int k = 0; k < t->reduced; k++)
-            sum = MADD(EACH(x[t->given[k]]), GIVEN_FOUR(t->product_of_basis + t->given[k] * WIDE + at), sum);
-        FOUR(z + at) = sum;
-    }
+    for (int k = 0; k < t->reduced; k++) thin_add(z, t->product_of_basis + t->given[k] * WIDE, x[t->given[k]]);
     if (b) add_rows(t->basis, b, z);
-    reduced_transposed(t, z, y);
+    reduced_transposed(t, t->reduced_inverse, z, y);
 }
 
 /* x = Z (Z'HZ)^-1 Z'b */
-static void solve_reduced(const wbc_tick *t, const double *b, double *x) {
+static void solve_reduced(const wbc_tick *t, const double *inverse, const double *b, double *x) {
     double y[WIDE], z[WIDE] = {0};
     add_rows(t->basis, b, z);
-    reduced_transposed(t, z, y);
-    for (int a = 0; a < t->width; a++) z[a] = thin_dot(t->reduced_inverse + a * WIDE, y);
+    reduced_transposed(t, inverse, z, y);
+    for (int a = 0; a < t->width; a++) z[a] = thin_dot(inverse + a * WIDE, y);
     for (int i = 0; i < WIDE; i++) x[i] = i < NV ? thin_dot(t->basis + i * WIDE, z) : 0.0;
 }
 
-/* The same of H + more / dof_scale^2, whose factor is not kept; 0 where it has none */
+/* The same of H + more / D^2, whose factor is not kept; 0 where it has none */
 static int solve_stiffened(wbc_tick *t, double more, const double *b, double *x) {
-    double gram[REDUCED_NV * THIN + 1], inverse[REDUCED_NV * THIN + 1];
-    for (int a = 0; a < t->width; a++)
-        for (int at = 0; at < THIN; at += 4) {
-            FOUR(gram + a * THIN + at) = GIVEN_FOUR(t->gram + a * WIDE + at);
-            FOUR(inverse + a * THIN + at) = GIVEN_FOUR(t->reduced_inverse + a * WIDE + at);
-        }
-    const int ok = stiffen_reduced(t, more, 0);
-    if (ok) solve_reduced(t, b, x);
-    for (int a = 0; a < t->width; a++)
-        for (int at = 0; at < THIN; at += 4) {
-            FOUR(t->gram + a * WIDE + at) = GIVEN_FOUR(gram + a * THIN + at);
-            FOUR(t->reduced_inverse + a * WIDE + at) = GIVEN_FOUR(inverse + a * THIN + at);
-        }
+    double stiff[REDUCED_NV * WIDE + 1], gram[REDUCED_NV * WIDE + 1], inverse[REDUCED_NV * WIDE + 1];
+    stiffened(t, more, stiff, gram);
+    const int ok = factor_gram(t, gram, inverse);
+    if (ok) solve_reduced(t, inverse, b, x);
     return ok;
 }
 
@@ -311,7 +316,7 @@ INLINE void some_seen(wbc_tick *t, int n, int count, int at) {
     const double *own[4];
     four sum[4] = {{0}};
     for (int r = 0; r < count; r++) own[r] = t->basis + t->given[n + r] * WIDE;
-    for (int a = 0; a < t->width; a++) {
+    for (int a = 0; a < t->width && a < at + 4; a++) {
         const four inverse = GIVEN_FOUR(t->reduced_inverse + a * WIDE + at);
         for (int r = 0; r < count; r++) sum[r] = MADD(EACH(own[r][a]), inverse, sum[r]);
     }

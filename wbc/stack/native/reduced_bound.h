@@ -36,7 +36,7 @@ static double reduced_bound(const wbc_tick *t, const double *size) {
     const DAQPWorkspace *work = &t->daqp;
     double missed[WIDE], shift[WIDE], image[WIDE], part[ACTIVE_MAX], length = 0.0, rest = 0.0, reach = 0.0, most = 0.0;
     for (int n = 0; n < t->reduced; n++) missed[n] = t->missed_size[n];
-    size_by_rows(t, missed, shift);
+    by_rows(t, missed, shift, 1);
     for (int k = 0; k < t->reduced; k++) {
         const int i = t->given[k];
         rest += t->H[i * WIDE + i] * shift[i] * shift[i];
@@ -67,12 +67,12 @@ static double reduced_bound(const wbc_tick *t, const double *size) {
     return sqrt(reach) * (sqrt(thin_dot(image, image)) + rest) + most;
 }
 
-/* One Newton step on the active set: x = v - P missed + T dy, where equality rows are missed by `missed`, which is changed, and
+/* One Newton step on the active set: x = v - P missed + T dy, where equality rows are missed by `missed`, and
  * `residual`, or none, is left of the stationarity;   dy + M' mu = -T'(residual + H dx),   M dy = side - M y */
-static void correct_reduced(wbc_tick *t, double *missed, const double *residual) {
+static void correct_reduced(wbc_tick *t, const double *missed, const double *residual) {
     DAQPWorkspace *work = &t->daqp;
     double moved[WIDE], dy[WIDE], mu[ACTIVE_MAX];
-    by_rows(t, missed, moved);
+    by_rows(t, missed, moved, 0);
     for (int i = 0; i < WIDE; i++) moved[i] = -moved[i];
     reduced_forces(t, moved, residual, dy);
     for (int at = 0; at < THIN; at += 4) FOUR(dy + at) = -GIVEN_FOUR(dy + at);

@@ -11,7 +11,7 @@ INLINE int is_looked_at(const wbc_tick *t, int k) { return !t->idle[k] && t->low
 static void reduced_point(wbc_tick *t) {
     double sides[WIDE], y[WIDE];
     for (int k = 0; k < t->reduced; k++) sides[k] = t->low[NV + t->equal_row[k]];
-    by_rows(t, sides, t->x);
+    by_rows(t, sides, t->x, 0);
     reduced_forces(t, t->x, t->g, y);
     for (int i = 0; i < NV; i++) t->x[i] -= thin_dot(t->through + i * WIDE, y);
 }

@@ -150,6 +150,10 @@ typedef wbc_bits four_bits __attribute__((vector_size(4 * sizeof(wbc_bits))));
 /* The numbers of four places from one on */
 #define PLACES(i) ((four_bits){(i), (i) + 1, (i) + 2, (i) + 3})
 
+/* Ones behind the first of eight places: four of them from 3 - n on are right of place n */
+static const wbc_bits behind[8] = {0, 0, 0, 0, -1, -1, -1, -1};
+#define BEHIND(x, place) ((four)((four_bits)(x) & (four_bits)GIVEN_FOUR(behind + 3 - (place))))
+
 #define SUM_OF_FOUR(x) (((x)[0] + (x)[2]) + ((x)[1] + (x)[3]))
 /* Macros and no functions: what returns four numbers is called in another way on each processor. */
 #define RAISE_FOUR(most, x) \
@@ -158,6 +162,13 @@ typedef wbc_bits four_bits __attribute__((vector_size(4 * sizeof(wbc_bits))));
         const four_bits first_ = other_ > (most); \
         (most) = (four)(((four_bits)other_ & first_) | ((four_bits)(most) & ~first_)); \
     } while (0)
+
+/* As integers, which takes one branch */
+INLINE int is_zero(const double *x) {
+    wbc_bits bits;
+    memcpy(&bits, x, sizeof bits);
+    return !(bits & MOST_BITS);
+}
 
 INLINE double clamp(double x, double low, double high) { return x < low ? low : (x > high ? high : x); }
 

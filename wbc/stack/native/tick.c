@@ -163,9 +163,9 @@ static int answer(wbc_tick *t, int *nameless) {
 static int has_answer(const wbc_tick *t, int flag) { return flag <= WBC_RELAXED && !unsound(t, flag); }
 
 #if BENDING > 0
-/* Sides are moved until the rows make up for what they lose, as far as that gets less; what they lose then, as a rate */
-static double correct_rows(wbc_tick *t, int all, int *flag, int *nameless) {
-    double last[MC + 1], next[MC + 1], worst = wbc_tick_find_lost(t, all), off = bent_by(t, worst, t->eased + EXACT);
+/* Sides are moved until the rows make up for what they lose, `worst` as a rate, as far as that gets less; what they lose then */
+static double correct_rows(wbc_tick *t, int all, double worst, int *flag, int *nameless) {
+    double last[MC + 1], next[MC + 1], off = bent_by(t, worst, t->eased + EXACT);
     for (int n = 0; n < (worst > BENDS ? BENDINGS : REFINED) && off > 1.0 && has_answer(t, *flag); n++) {
         const double before = off;
         for (int k = 0; k < MC; k++) {
@@ -191,12 +191,15 @@ static int bent_answer(wbc_tick *t, int flag, int *nameless) {
     const int all = flag == WBC_SOLVED;
     double worst = wbc_tick_find_lost(t, all);
     const int bends = worst > BENDS;
-    if (worst > (CALM ? STRETCHED : BENDS) && has_answer(t, flag) && curve_rows(t)) flag = answer(t, nameless);
-    worst = correct_rows(t, all, &flag, nameless);
+    if (worst > (CALM ? STRETCHED : BENDS) && has_answer(t, flag) && curve_rows(t)) {
+        flag = answer(t, nameless);
+        worst = wbc_tick_find_lost(t, all);
+    }
+    worst = correct_rows(t, all, worst, &flag, nameless);
     for (int n = 0; n < SHORTER && has_answer(t, flag) && (bent_by(t, worst, OPENED) > 1.0 || (bends && n == 0 && turns_round(t))); n++) {
         shorten(t);
         flag = answer(t, nameless);
-        worst = correct_rows(t, all, &flag, nameless);
+        worst = correct_rows(t, all, wbc_tick_find_lost(t, all), &flag, nameless);
     }
     if (bent_by(t, worst, OPENED) > 1.0 && flag <= WBC_RELAXED && report_lost(t)) flag = (int)(t->report.flag = WBC_RELAXED);
 #else
@@ -272,14 +275,14 @@ EXPORT long long wbc_tick_offset(int k) {
     return k >= 0 && k < (int)(sizeof offsets / sizeof *offsets) ? offsets[k] : -1;
 }
 
-#if LEVELS > 0
-/* J of all task rows [MT, NV], for solvers in Python */
+/* J of all task rows in the last QP [MT, NV] */
 EXPORT void wbc_tick_task_rows(const wbc_tick *t, double *J) {
     memset(J, 0, MT * NV * sizeof(double));
     for (int k = 0; k < MT; k++)
         for (int e = j_start[k]; e < j_start[k + 1]; e++) J[k * NV + j_col[e]] = t->jt[e];
 }
 
+#if LEVELS > 0
 /* The curvature in H [NV, NV]; 0 for none */
 EXPORT int wbc_tick_curvature(const wbc_tick *t, double *out) {
     memcpy(out, t->curvature, sizeof t->curvature);

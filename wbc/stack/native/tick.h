@@ -171,7 +171,7 @@ typedef struct {
     double opened[CLOSING + 1], closing_columns[NV * CLOSING_ROOM + 1];
     double closing_factor[2 * CLOSING * CLOSING_ROOM + 1], closing_inverse[CLOSING + 1];
     double gram[REDUCED_NV * WIDE + 1], reduced_R[REDUCED_NV * WIDE + 1], reduced_inverse[REDUCED_NV * WIDE + 1];
-    double reduced_pivot[NV], seen[REDUCED_NV * M_ALL + 1];
+    double seen[REDUCED_NV * M_ALL + 1];
     /* DAQP workspace on our own memory */
     DAQPWorkspace daqp;
     DAQPProblem problem;
