@@ -78,5 +78,6 @@ def _worth(climber: Climber, limb: int, angles: Array, length: float) -> Array:
     bent = np.empty(angles.shape[:2])
     for posture in np.ndindex(*bent.shape):
         q = climber.with_limb(climber.rest, limb, angles[posture])
-        bent[posture] = np.linalg.svd(robot.jacobian(q, frame)[:3, rows], compute_uv=False)[-1] / length
+        least = np.linalg.svd(robot.jacobian(q, frame)[:3, rows], compute_uv=False)[-1]
+        bent[posture] = least / length if length else 0.0
     return np.asarray(np.minimum(bent, room) - MIRRORED * far / (2.0 * np.pi))
