@@ -278,8 +278,7 @@ MUTATIONS = (
         "wbc/climb/checker/checking.py",
         "moved - np.maximum(off[0] - off, 0.0)",
         "0.2 * moved",
-        ("climb/test_checker.py",),
-        "fault",
+        ("climb/test_checker_faults.py",),
     ),
     Mutation(
         "wbc/climb/native/balance.h",

@@ -77,6 +77,9 @@ def test_every_mistake_that_is_planted_has_one_place() -> None:
     places = {(mutation.file, mutation.right): (ROOT / mutation.file).read_text() for mutation in MUTATIONS}
     assert len(places) > 80
     assert [key for key, text in places.items() if text.count(key[1]) != 1] == []
+    names = {name: (ROOT / "tests" / name).read_text() for mutation in MUTATIONS for name in mutation.tests}
+    chosen = [(m.tests, word) for m in MUTATIONS if m.only for word in m.only.split(" or ")]
+    assert [(t, word) for t, word in chosen if not any(re.search(rf"def test\w*{word}", names[n]) for n in t)] == []
 
 
 def test_what_docstrings_refer_to_is_there() -> None:
