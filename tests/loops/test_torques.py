@@ -14,7 +14,7 @@ import pinocchio as pin
 import pytest
 
 import wbc
-from tests.loops.mechanisms import MOTORS, NAMED, body, hinge, mjcf, random_linkage, with_motors
+from tests.loops.mechanisms import MOTORS, NAMED, body, hinge, mjcf, random_linkage, with_motors, within
 from tests.loops.test_loops import opened
 from tests.repeats import repeats
 from wbc.errors import RangeError, UnknownNameError, UnsupportedJointError
@@ -224,11 +224,11 @@ def test_accelerations_keep_loops_closed() -> None:
     assert -np.diff(gaps).min() < 0.11 * robot.characteristic_length * SPARSE * DT
 
 
-def coarse(name: str, count: int) -> Iterator[wbc.Step]:
-    """Ticks of accelerations of 20 ms, in which loops bend by more than rounding of limits."""
-    robot, rng = driven(name), np.random.default_rng(0)
-    stack = wbc.Stack(robot, 0.02).add(wbc.tasks.Posture(), name="posture").add(wbc.tasks.JointLimits())
-    controller, q, v = stack.compile(command="acceleration"), robot.neutral, np.zeros(robot.nv)
+def coarse(robot: wbc.Robot, count: int, command: str = "acceleration", dt: float = 0.02) -> Iterator[wbc.Step]:
+    """Ticks of 20 ms, in which loops bend by more than rounding of limits."""
+    rng = np.random.default_rng(0)
+    stack = wbc.Stack(robot, dt).add(wbc.tasks.Posture(), name="posture").add(wbc.tasks.JointLimits())
+    controller, q, v = stack.compile(command=command), robot.neutral, np.zeros(robot.nv)
     controller.reset(q)
     for k in range(count):
         if k % 30 == 0:
@@ -240,17 +240,31 @@ def coarse(name: str, count: int) -> Iterator[wbc.Step]:
 
 def test_velocities_that_keep_loops_closed_are_within_limits() -> None:
     robot = driven("delta")
-    for step in coarse("delta", 450):
+    for step in coarse(robot, 450):
         assert step.status == "solved"
         assert np.abs(step.v).max() <= 3.0 * (1.0 + 1e-9)
         assert np.abs(step.a).max() <= 200.0 * (1.0 + 1e-9)
         assert max(robot.loop_gaps(step.q_next).values()) <= 1e-9
 
 
+def test_positions_to_which_torques_lead_are_within_limits() -> None:
+    """Limits of motion are rows there that may give way; closing loops must not pass them in silence."""
+    robot = within(driven("delta"), 0.3)
+    index, has = robot.position_index, robot.position_index >= 0
+    lower, upper = robot.limits.position_lower[has], robot.limits.position_upper[has]
+    nearest = np.inf
+    for step in coarse(robot, 450, "torque", 0.01):
+        assert step.status == "solved"
+        room = np.minimum(step.q_next[index[has]] - lower, upper - step.q_next[index[has]])
+        assert room.min() >= -1e-10
+        nearest = min(nearest, room.min())
+    assert nearest < 1e-4, "no limit is met"
+
+
 def test_coarse_ticks_of_an_ankle_are_solved() -> None:
     """One of these gave way: where it led no correction of its size closed the loops."""
     robot = driven("ankle")
-    for step in coarse("ankle", 450):
+    for step in coarse(robot, 450):
         assert step.status == "solved"
         assert max(robot.loop_gaps(step.q_next).values()) <= 1e-9
 

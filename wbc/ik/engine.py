@@ -129,10 +129,15 @@ class SearchEngine:
         self._units = np.array([row.scale(1.0) for block in layout.of_form("task") for row in block.rows])
         self.tick: CompiledTick = tick.assembly if isinstance(tick, SolvedTick) else tick
         self._stops = stops(self.stack, layout)
-        at, lower, upper = np.array(self._stops[0]), *self._stops[1:]
+        at = np.array(self._stops.bounds)
         dofs = np.flatnonzero(at >= 0)
         #: coordinates with position limits: where they are in q and in ``bound_enabled``, and the limits
-        self._limited = self.stack.robot.position_index[dofs], at[dofs], lower[dofs], upper[dofs]
+        self._limited = (
+            self.stack.robot.position_index[dofs],
+            at[dofs],
+            self._stops.lower[dofs],
+            self._stops.upper[dofs],
+        )
         self._switches: bytes | None = None
         self._limits = np.zeros(0), np.zeros(0)
         self._sensing = ItemSensing(self.core, self.tick)
@@ -212,7 +217,7 @@ class SearchEngine:
     @cached_property
     def starts(self) -> Starts:
         """Random configurations of the joints that move a goal."""
-        _, lower, upper = self._stops
+        lower, upper = self._stops.lower, self._stops.upper
         robot = self.stack.robot
         everywhere = Starts(robot, lower, upper, np.ones(robot.nv, dtype=bool))
         q = np.where(everywhere.chosen != 0.0, everywhere.table(1, 0)[0], self.tick.q)

@@ -99,7 +99,7 @@ def _numbers(stack: Declaration, layout: Layout, program: TickProgram) -> StackN
         else program.curvature.sparsity_out(0)
     )
     brake_at, brake_limit = brakes(stack, layout)
-    stop_at, stop_low, stop_high = stops(stack, layout)
+    stop = stops(stack, layout)
     spare = spare_rows(stack, layout)
     forces = forces_in_loops(stack, layout)
     sizes: dict[str, float] = {
@@ -159,10 +159,11 @@ def _numbers(stack: Declaration, layout: Layout, program: TickProgram) -> StackN
         "force_scale": ("double", force_scales(stack, layout, program)),
         "brake_at": ("int", brake_at),
         "brake_limit": ("double", np.where(np.isfinite(brake_limit), brake_limit, 0.0)),
-        "stop_at": ("int", stop_at),
+        "stop_at": ("int", stop.bounds),
+        "stop_row": ("int", stop.rows),
         "stop_q": ("int", np.maximum(stack.robot.position_index, 0)),
-        "stop_low": ("double", np.clip(stop_low, -1e30, 1e30)),
-        "stop_high": ("double", np.clip(stop_high, -1e30, 1e30)),
+        "stop_low": ("double", np.clip(stop.lower, -1e30, 1e30)),
+        "stop_high": ("double", np.clip(stop.upper, -1e30, 1e30)),
         "row_scale": ("double", scales),
         "dof_scale": ("double", dofs),
         "damping": ("double", stack.damping / dofs**2),

@@ -45,10 +45,10 @@ INT_TABLES = (
     "j_start", "j_col", "a_start", "a_end", "a_col", "give_order", "late_row", "spare_first",
     "spare_row", "spare_held", "row_order", "bound_sequence",
     "unit_start", "unit_size", "row_torque",
-    "k_row", "k_col", "bent", "margin_at", "rate_at", "gain_at", "brake_at", "stop_at", "stop_q", "kept_of", "price_at",
-    "slewed_at", "slewed_dof", "level_start", "row_level", "ball_pose", "ball_velocity", "ball_margin", "ball_rate",
-    "ball_row", "ball_first", "row_segment", "segment_row", "sensed_row", "sensed_count", "sensed_distance",
-    "sensed_line", "sensed_side", "block_row", "block_rows", "block_first", "block_columns",
+    "k_row", "k_col", "bent", "margin_at", "rate_at", "gain_at", "brake_at", "stop_at", "stop_row", "stop_q", "kept_of",
+    "price_at", "slewed_at", "slewed_dof", "level_start", "row_level", "ball_pose", "ball_velocity", "ball_margin",
+    "ball_rate", "ball_row", "ball_first", "row_segment", "segment_row", "sensed_row", "sensed_count",
+    "sensed_distance", "sensed_line", "sensed_side", "block_row", "block_rows", "block_first", "block_columns",
 )  # fmt: skip
 REAL_TABLES = (
     "force_scale", "brake_limit", "stop_low", "stop_high", "row_scale", "dof_scale", "damping", "slack_reported",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -180,16 +181,34 @@ def rate_table(layout: Layout) -> list[int]:
     return [b.slots["rate"].start if b.form == "margins" else 0 for b in blocks for _ in b.rows]
 
 
-def stops(stack: Declaration, layout: Layout) -> tuple[list[int], np.ndarray, np.ndarray]:
-    """(entry of ``bound_enabled``, -1 for none; lower; upper) of the position limits of each degree of freedom."""
-    slots = [-1] * layout.variables
+class Stops(NamedTuple):
+    """Position limits of each degree of freedom.
+
+    Attributes:
+        bounds: entries of ``bound_enabled``, -1 for none.
+        rows: general rows, of limits that may give way; -1 for none.
+        lower: least positions [rad or m].
+        upper: largest positions [rad or m].
+    """
+
+    bounds: list[int]
+    rows: list[int]
+    lower: np.ndarray
+    upper: np.ndarray
+
+
+def stops(stack: Declaration, layout: Layout) -> Stops:
+    """Position limits of a stack, the narrowest where several items have one."""
+    slots, rows = ([-1] * layout.variables for _ in range(2))
     lower, upper = np.full(layout.variables, -np.inf), np.full(layout.variables, np.inf)
-    for k, block in enumerate(layout.of_form("bounds")):
+    bounds = [(slots, k * layout.variables, block) for k, block in enumerate(layout.of_form("bounds"))]
+    yielding = [(rows, block.start, block) for block in layout.of_form("rows") if block.entry.yielding]
+    for places, first, block in bounds + yielding:
         item = block.entry.item
         assert isinstance(item, Constraint)
         below, above = item.position_limits(stack.robot)
         for i in np.flatnonzero(np.isfinite(below) | np.isfinite(above)):
-            slots[i] = k * layout.variables + int(i)
+            places[i] = first + int(i)
         lower[: layout.nv] = np.maximum(lower[: layout.nv], below)
         upper[: layout.nv] = np.minimum(upper[: layout.nv], above)
-    return slots, lower, upper
+    return Stops(slots, rows, lower, upper)

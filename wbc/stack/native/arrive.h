@@ -203,7 +203,9 @@ INLINE double passes_bounds(double low, double high, double command, double numb
  * the acceleration that leads there within a tick */
 static double joint_passes(const wbc_tick *t, const double *v, int i, double rounding) {
     const double command = t->report.v[i], over = passes_bounds(t->low[i], t->high[i], command, (v[i] - t->v_last[i]) / t->dt);
-    if (stop_at[i] < 0 || t->bound_enabled[stop_at[i]] == 0.0) return over;
+    const int bound = stop_at[i] >= 0 && t->bound_enabled[stop_at[i]] != 0.0;
+    const int row = stop_row[i] >= 0 && t->enabled[stop_row[i]] != 0.0;
+    if (!bound && !row) return over;
     const double place = t->q[stop_q[i]] + t->dt * (t->v_last[i] + 0.5 * t->dt * command);
     const double beyond = passes(stop_low[i], stop_high[i], place, t->report.next_q[stop_q[i]], rounding);
     return larger(over, 2.0 * beyond / (t->dt * t->dt));

@@ -52,6 +52,7 @@
  *   LEFT_FREE DAMPING   singular values below it are left to later levels; damping of one that is 0
  *   SLEWED slewed_at slewed_dof   torques that may change only so fast: where p has the last one, degree of freedom
  *   stop_at stop_q stop_low stop_high   the same for position limits, with the coordinate that is limited
+ *   stop_row    the general row of position limits that may give way (-1: none)
  */
 #ifndef WBC_TICK_H
 #define WBC_TICK_H
