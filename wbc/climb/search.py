@@ -269,7 +269,7 @@ class StanceSearch:
         self._late: set[LateMove] = set()
         #: By how much moves were put off [steps]
         self._delays = dict[tuple[int, bytes], float]()
-        #: How often the like of a move was out of reach since one was not
+        #: How often the like of a move was out of reach, or not borne, since one was neither
         self._misses = Counter[tuple[Any, ...]]()
         #: Limbs that could not be lifted from the like of a stance
         self._stuck = dict[tuple[Any, ...], set[int]]()
@@ -378,7 +378,7 @@ class StanceSearch:
 
     def _put_off(self, node: _Node, after: NDArray[np.int32]) -> float:
         """What a move costs beyond what it was put off by so far: as one that is late, for each time that its like was
-        out of reach since one was not, and where nothing could be lifted from its like [steps].
+        out of reach or not borne since one was neither, and where nothing could be lifted from its like [steps].
         """
         key = id(node), after.tobytes()
         misses = self._misses.get(self._alike(node.contacts, after), 0)
@@ -441,7 +441,8 @@ class StanceSearch:
         self.tried[how] += 1
         if attempt == 0:
             like = self._alike(node.contacts, after)
-            self._misses[like] = self._misses[like] + 1 if how == PostureOutcome.NOT_REACHED else 0
+            missed = how in (PostureOutcome.NOT_REACHED, PostureOutcome.NOT_BORNE)
+            self._misses[like] = self._misses[like] + 1 if missed else 0
         if how != PostureOutcome.STANDS:
             return None
         return _Node(after, land, node.steps + 1, min(before, slack), node, cost, lift if moves else None)

@@ -341,7 +341,8 @@ static int posture(climb_t *c, const int *contact, const wish_t *given, double *
             if (left > CLOSE && left > STALLS * before) break;
             before = left;
         }
-        if (!tighten(c, contact, wish, base, angle)) return NOT_REACHED;
+        /* Out of reach only where nothing but the contacts was asked for: what is led elsewhere for the equilibrium, or apart, was there */
+        if (!tighten(c, contact, wish, base, angle)) return look ? how : NOT_REACHED;
         place_all(c, base, angle, placed, center);
         *slack = slack_of(c, wish->support, center, wish->slack);
         how = NOT_BORNE;
