@@ -16,7 +16,7 @@ from wbc.climb import ClimbOptions, ContactPlan, Equilibrium, first_stance, scen
 from wbc.climb.checker import CheckRules
 from wbc.climb.drive import standing_plan
 from wbc.climb.loop import ClimbLoop, PlanReference
-from wbc.climb.plants import ClimbPlant, PlantErrors
+from wbc.climb.plants import CONTACT_TIME, ClimbPlant, PlantErrors
 from wbc.climb.scene import size_of
 from wbc.validation import Array
 
@@ -101,9 +101,13 @@ def test_loads_are_shared_by_what_contacts_bear() -> None:
     course = scenes.draw("rail", size_of(machine), 0)
     q, options = scenes.placed(machine, course.start), ClimbOptions.by_torques()
     plan = standing_plan(machine, course.scene, first_stance(machine, course.scene, q, options.stances))
-    loop = ClimbLoop(plan, ClimbPlant(machine, course.scene))
+    plant = ClimbPlant(machine, course.scene)
+    loop = ClimbLoop(plan, plant)
     while loop.time < 0.2:
         loop.tick()
+    # MuJoCo takes the mean of the time constants of what touches
+    assert plant.data.ncon >= 8
+    assert {float(plant.data.contact[k].solref[0]) for k in range(plant.data.ncon)} == {CONTACT_TIME}
     assert loop.step is not None
     hand = loop.step.forces["right_hand contact"]
     assert np.linalg.norm(hand[:3]) < 0.4 * 60.0

@@ -209,7 +209,8 @@ class ClimbPlant(GrippingMujocoPlant):
                 shape.become(geom, spec, name)
             else:
                 raise ShapeError(f"scene.bodies, {name}", type(shape).__name__, "MuJoCo has no such shape")
-            geom.name = f"scene {name}"
+            # Of two time constants the mean counts
+            geom.name, geom.solref = f"scene {name}", [CONTACT_TIME, 1.0]
             # Of two frictions the larger one counts: that of the foot
             geom.contype, geom.conaffinity, geom.friction[0] = TOUCHED, TOUCHING, 0.0
         grips = [contact_frame(limb) for limb in climber.limbs if limb.contact.pulls]
