@@ -106,7 +106,7 @@ def test_loads_are_shared_by_what_contacts_bear() -> None:
     while loop.time < 0.2:
         loop.tick()
     # MuJoCo takes the mean of the time constants of what touches
-    assert plant.data.ncon >= 8
+    assert plant.data.ncon >= 4
     assert {float(plant.data.contact[k].solref[0]) for k in range(plant.data.ncon)} == {CONTACT_TIME}
     assert loop.step is not None
     hand = loop.step.forces["right_hand contact"]
