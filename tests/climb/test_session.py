@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import wbc.log
-from wbc.climb import first_stance, machines, scenes
+from wbc.climb import machines
 from wbc.climb.folder import PART, read_folder, resumed
 from wbc.climb.grids import cylinder_grid, plane_grid
 from wbc.climb.loop import ClimbLoop, ClimbOutcome
@@ -27,7 +27,6 @@ from wbc.climb.request import (
     SceneRequest,
     request_of,
 )
-from wbc.climb.scene import size_of
 from wbc.climb.scene_files import save_scene
 from wbc.climb.search import NoStancesError
 from wbc.climb.session import ClimbDone, ClimbHooks, check_folder, climb, climber_of, scene_of, setup_of
@@ -233,15 +232,6 @@ def test_feet_that_only_press_do_not_hold_what_does_not_weigh() -> None:
     request = ClimbRequest(climber=ClimberRequest("hexapod"), scene=SceneRequest(scene="stairs", gravity=(0, 0, 0)))
     with pytest.raises(NoStancesError, match=r"not borne.*nothing weighs, and feet that only press"):
         climb(request)
-
-
-def test_ice_bears_no_hexapod_within_reach() -> None:
-    """Its feet do reach: bounds of the equilibrium, which no pose meets there, are the reason."""
-    climber = machines.climber("hexapod")
-    course = scenes.draw("stepping_stones", size_of(climber))
-    ice = replace(course.scene, footholds=tuple(replace(hold, friction=1e-3) for hold in course.scene.footholds))
-    with pytest.raises(NoStancesError, match=r"\(400 not borne\); the best lacks 0\.0198 of the weight"):
-        first_stance(climber, ice, scenes.placed(climber, course.start))
 
 
 def test_joints_without_a_limit_of_speed_get_one_that_is_said(

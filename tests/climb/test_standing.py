@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from wbc.climb.machines import climber as preset
 from wbc.climb.request import ClimberRequest
 from wbc.climb.scene import size_of
 from wbc.climb.scenes import draw, placed
+from wbc.climb.search import StanceOptions
 from wbc.climb.session import climber_of
 from wbc.climb.world import SPARE
 from wbc.robot.pairs.distances import Links
@@ -77,6 +79,23 @@ def test_a_refusal_names_the_links_that_touch() -> None:
     course = draw("stairs", size_of(climber))
     with pytest.raises(NoStancesError, match=r"links touch.*; most often \w+_link and floor 1 touch"):
         first_stance(climber, course.scene, placed(climber, course.start))
+
+
+@pytest.mark.parametrize("name", ["go2", "hyq"])
+def test_a_refusal_for_want_of_friction_says_so(name: str) -> None:
+    """What is out of reach does not depend on friction. A solver that weighs both at once finds nothing in reach."""
+    climber, counts = of_file(name), []
+    course = draw("stairs", size_of(climber))
+    for friction in (0.03, 0.001):
+        with pytest.raises(NoStancesError) as refused:
+            first_stance(climber, course.scene, placed(climber, course.start), StanceOptions(friction=friction))
+        counts.append(
+            {why: int(n) for n, why in re.findall(r"(\d+) (out of reach|not borne|links touch)", str(refused.value))}
+        )
+    for count in counts:
+        assert sum(count.values()) == 400
+        assert count["not borne"] > 20
+        assert count["out of reach"] == counts[0]["out of reach"] < 20
 
 
 def test_fingers_that_are_too_near_as_the_file_has_them_are_opened_by_the_joint_that_they_follow(
