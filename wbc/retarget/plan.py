@@ -269,7 +269,8 @@ def _pitched(angles: Array) -> Array:
 
 def _median(values: Array) -> Array:
     """Over the ticks: as numpy's, which takes ten times as long of so few."""
-    ordered, count = np.sort(values, axis=0), len(values)
+    count = len(values)
+    ordered = np.sort(values, axis=0) if count > 1 else values
     return np.asarray(0.5 * (ordered[(count - 1) // 2] + ordered[count // 2]))
 
 
