@@ -269,7 +269,7 @@ class Engine:
 
     def table(self, targets: Targets) -> tuple[Array, Array]:
         """Positions [ticks, places, 3] and rotations [ticks, turns, 3, 3] that the stack follows, the pelvis' first."""
-        places, level = targets.places, np.broadcast_to(np.eye(3), (len(targets.pelvis), 3, 3))
+        places, level = targets.places, np.zeros((len(targets.pelvis), 3, 3)) + np.eye(3)
         if self._balances:
             places = np.concatenate([places, balanced(targets)[:, None]], axis=1)
         return places, np.stack([targets.turns.get(name, level) for name in self._turns], axis=1)

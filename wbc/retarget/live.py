@@ -12,7 +12,7 @@ from wbc.retarget.clip import Array
 from wbc.retarget.correspondence import Correspondence
 from wbc.retarget.engine import Engine
 from wbc.retarget.mapping import Mapper
-from wbc.retarget.plan import BEFORE, BLEND, Planner, logarithms, minimum_jerk, toward
+from wbc.retarget.plan import BEFORE, BLEND, Planner, logarithms, minimum_jerk, turned_toward
 from wbc.retarget.stances import FAST, HAND_HEIGHT, LEVEL, SLOW
 from wbc.retarget.targets import Targets
 from wbc.rotations import exponential
@@ -59,7 +59,7 @@ class LiveRetargeter:
         self._slow, self._stands = np.zeros((2, count), dtype=bool)
         #: share of the skeleton's path in an end's target, place and heading where it stands
         self._shares, self._places = np.ones(count), np.zeros((count, 3))
-        self._headings: list[Array | None] = [None] * count
+        self._headings = np.tile(np.eye(3), (count, 1, 1))
         self._last: tuple[Array, Array] | None = None
         self._with_turns = False
         self._low = 0.0
@@ -84,8 +84,7 @@ class LiveRetargeter:
         targets = self._mapper.targets(given[None], None if rotations is None else rotations[None], ankle)
         self._planner.turn_ankles(targets)
         if self._match.body.robot.base != "fixed":
-            for limb in range(len(self._sources)):
-                self._stand(targets, limb)
+            self._stand(targets)
             self._low = max(float(self._planner.lowering(targets)[0]), self._low - RISE / self.rate)
             self._planner.lower(targets, np.array([self._low]))
         now, held = self._engine.table(targets), targets.grips(0)
@@ -107,22 +106,23 @@ class LiveRetargeter:
         near = low[self._of_legs].min(initial=np.inf) + np.where(self._of_legs, LEVEL, HAND_HEIGHT) * self._leg
         self._stands = self._slow & (low < near)
 
-    def _stand(self, targets: Targets, limb: int) -> None:
-        """A limb's target of this frame: on its way to the place where it stands, there, or on its way from it."""
-        stands, share = bool(self._stands[limb]), float(self._shares[limb])
-        if stands and share >= 1.0:
-            self._places[limb], self._headings[limb] = self._planner.standing_place(targets, limb, slice(0, 1))
+    def _stand(self, targets: Targets) -> None:
+        """Targets of limbs in this frame: where they stand, or on their way there or from there."""
+        planner = self._planner
+        for limb in np.flatnonzero(self._stands & (self._shares >= 1.0)).tolist():
+            self._places[limb], heading = planner.standing_place(targets, limb, slice(0, 1))
+            self._headings[limb] = np.eye(3) if heading is None else heading
         step = 1.0 / (BLEND * self.rate)
-        self._shares[limb] = share = max(share - step, 0.0) if stands else min(share + step, 1.0)
-        end, rotation = self._planner.raised(targets, limb)
-        if share < 1.0:
-            path = minimum_jerk(np.array([share]))
-            end, rotation = toward(self._places[limb], self._headings[limb], end, rotation, path)
-        targets.chains[:, limb, 3] = end
-        if rotation is not None:
-            targets.turns[self._mapper.limbs[limb]] = rotation
-        targets.held[0, limb] = targets.stands[0, limb] = stands and share * BLEND <= BEFORE
-        targets.lies[0, limb] = self._hands[limb] and self._places[limb, 2] <= self._radii[limb]
+        shares = self._shares + np.where(self._stands, -step, step)
+        self._shares = np.minimum(np.maximum(shares, 0.0), 1.0)
+        paths = minimum_jerk(self._shares)
+        targets.chains[0, :, 3] = self._places + paths[:, None] * (planner.raised(targets)[0] - self._places)
+        if feet := [limb for limb in planner.flat if paths[limb] < 1.0]:
+            turns = np.concatenate([targets.turns[planner.limbs[limb]] for limb in feet])
+            turns = turned_toward(self._headings[feet], turns, paths[feet])
+            targets.turns.update((planner.limbs[limb], turn[None]) for limb, turn in zip(feet, turns, strict=True))
+        targets.held[0] = targets.stands[0] = self._stands & (self._shares * BLEND <= BEFORE)
+        targets.lies[0] = self._hands & (self._places[:, 2] <= self._radii)
 
 
 def _between(last: tuple[Array, Array], now: tuple[Array, Array], every: int) -> tuple[Array, Array]:

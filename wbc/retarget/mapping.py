@@ -64,6 +64,7 @@ class Mapper:
         self._top = arms if leads else [match.chest]
         self._trunk_at_rest = self._trunk(rest[None])
         self._feet = [k for k, name in enumerate(self.limbs) if body.is_foot(name)]
+        self._flat = [k for k in self._feet if own[k].contact == "flat"]
         self._legs = [k for k, name in enumerate(self.limbs) if name.endswith("leg") and upright and free]
         #: of limbs: whether the chest carries one, where its base is from what carries it, in the body's axes [m]
         self._from_chest = np.array([upright and name.endswith("arm") for name in self.limbs])[:, None]
@@ -144,28 +145,25 @@ class Mapper:
         known = {"pelvis": pelvis, "chest": chest}
         if turns is not None and match.head >= 0 and body.head:
             known["head"] = turns[:, match.head] @ axes
-        for k, name in enumerate(self.limbs):
-            if k not in self._feet and turns is not None:
-                known[name] = turns[:, self._leads[k].end] @ axes
-            elif k in self._feet:
-                stood = np.array([0.0, 0.0, ankle[self._leads[k].source]])
-                foot = match.scale * (points[:, self._leads[k].end] - stood)
-                foot[:, :2] += (headings @ self._shifts[k])[:, :2]
-                foot[:, 2] += self._heights[k]
-                chains[:, k, 2:] = foot[:, None]
-                if body.limbs[name].contact == "flat":
-                    known[name] = self._turn_of_foot(self._leads[k], points, turns, pelvis, headings)
-                    chains[:, k, 3] -= self._heights[k] * known[name][:, :, 2]
+        if turns is not None:
+            ends = (turns[:, self._chains[:, 2]] @ axes).swapaxes(0, 1)
+            known.update((name, ends[k]) for k, name in enumerate(self.limbs) if k not in self._feet)
+        if self._feet:
+            feet = match.scale * points[:, self._chains[self._feet, 2]]
+            stood = np.array([match.scale * ankle[self._leads[k].source] for k in self._feet])
+            feet[:, :, :2] += (self._shifts[self._feet] @ headings.swapaxes(1, 2))[:, :, :2]
+            feet[:, :, 2] += self._heights[self._feet] - stood
+            chains[:, self._feet, 2:] = feet[:, :, None]
+        for k in self._flat:
+            turn = self._turn_of_foot(self._leads[k], points, pelvis, headings) if turns is None else ends[k]
+            known[self.limbs[k]] = turn
+            chains[:, k, 3] -= self._heights[k] * turn[:, :, 2]
         stands, held, lies = np.zeros((3, count, len(self.limbs)), dtype=bool)
         return Targets(self.limbs, self._dt, place, chains, known, stands, held, lies)
 
-    def _turn_of_foot(
-        self, lead: LimbMatch, points: Array, turns: Array | None, pelvis: Array, headings: Array
-    ) -> Array:
-        """Rotations of a flat foot, in the body's axes at rest [frames, 3, 3]."""
+    def _turn_of_foot(self, lead: LimbMatch, points: Array, pelvis: Array, headings: Array) -> Array:
+        """Rotations of a flat foot, in the body's axes at rest, as points show them [frames, 3, 3]."""
         axes, rest = self.match.axes, self.match.skeleton.rest
-        if turns is not None:
-            return np.asarray(turns[:, lead.end] @ axes)
         if lead.tip == lead.end:
             return headings
         # Along the foot, as far as its rest is turned from there; the hips say where its side is

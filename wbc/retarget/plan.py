@@ -57,18 +57,13 @@ def logarithms(rotations: Array) -> Array:
 
 def minimum_jerk(share: Array) -> Array:
     """From 0 to 1 with rates and accelerations of 0 at both ends."""
-    s = np.clip(share, 0.0, 1.0)
+    s = np.minimum(np.maximum(share, 0.0), 1.0)
     return np.asarray(s**3 * (10.0 - 15.0 * s + 6.0 * s**2))
 
 
-def toward(
-    place: Array, heading: Array | None, end: Array, rotation: Array | None, share: Array
-) -> tuple[Array, Array | None]:
-    """Positions and rotations between those of a stance and those of a path, whose share is given [times]."""
-    shares = share[:, None]
-    if rotation is not None and heading is not None:
-        rotation = heading @ exponential(shares * logarithms(heading.T @ rotation))
-    return place + shares * (end - place), rotation
+def turned_toward(first: Array, second: Array, shares: Array) -> Array:
+    """Rotations between some, or one, and others [n, 3, 3], of which they have shares [n]."""
+    return np.asarray(first @ exponential(shares[:, None] * logarithms(np.swapaxes(first, -1, -2) @ second)))
 
 
 class Planner:
@@ -78,12 +73,13 @@ class Planner:
         self.body, self.limbs = body, tuple(limbs)
         self._own = own = [body.limbs[name] for name in limbs]
         self._feet = [k for k, name in enumerate(limbs) if body.is_foot(name)]
-        self._flat = [k for k in self._feet if own[k].contact == "flat"]
+        self.flat = [k for k in self._feet if own[k].contact == "flat"]
         #: lengths of two bones and way of the bend, and heights of ankles above soles, 0 of points, of limbs
         self._bones = np.array([(*limb.lengths, limb.bend) for limb in own])
-        self._ankle = np.array([limb.ankle if k in self._flat else 0.0 for k, limb in enumerate(own)])
+        self._ankle = np.array([limb.ankle if k in self.flat else 0.0 for k, limb in enumerate(own)])
         self._pitch = np.array([limb.pitch for limb in own])
         self._lie = np.array([limb.thickness[0] for limb in own])
+        self._radii = np.array([limb.radius for limb in own])
 
     def plan(self, targets: Targets, times: Array) -> Targets:
         """Targets at the times of ticks [s], of targets at the frames of a clip, with their stances."""
@@ -92,19 +88,20 @@ class Planner:
         if self.body.robot.base == "fixed":
             ticks.stands[:] = False
             return ticks
+        ends = self.raised(ticks)
         for limb in range(len(self.limbs)):
-            self._stand(ticks, limb)
+            self._stand(ticks, limb, ends[:, limb])
         self.lower(ticks, self.lowering(ticks))
         return ticks
 
     def turn_ankles(self, targets: Targets) -> None:
         """Turn flat feet about their axes to the left as far as their ankles need it."""
-        if self._flat:
-            hips, towards, ankles, _ = np.moveaxis(targets.chains[:, self._flat], 2, 0)
-            rotations = np.stack([targets.turns[self.limbs[k]] for k in self._flat], axis=1)
-            shanks = self.knees(self._flat, hips, towards, ankles, targets.turns["pelvis"]) - ankles
-            turns = self._ankle_turns(self._flat, rotations, shanks)
-            for number, limb in enumerate(self._flat):
+        if self.flat:
+            hips, towards, ankles, _ = np.moveaxis(targets.chains[:, self.flat], 2, 0)
+            rotations = np.stack([targets.turns[self.limbs[k]] for k in self.flat], axis=1)
+            shanks = self.knees(self.flat, hips, towards, ankles, targets.turns["pelvis"]) - ankles
+            turns = self._ankle_turns(self.flat, rotations, shanks)
+            for number, limb in enumerate(self.flat):
                 if turns[:, number].any():
                     turned = rotations[:, number] @ _pitched(turns[:, number])
                     targets.turns[self.limbs[limb]] = turned
@@ -136,17 +133,16 @@ class Planner:
         least, most = self._pitch[legs].T
         return np.asarray(np.minimum(np.maximum(least + ANKLE_SPARE + leans, 0.0), most - ANKLE_SPARE + leans))
 
-    def _stand(self, targets: Targets, limb: int) -> None:
-        """Put a limb at rest in its stances, and lead it there and away."""
+    def _stand(self, targets: Targets, limb: int, end: Array) -> None:
+        """Put a limb, whose path is given, at rest in its stances, and lead it there and away."""
         name, dt, stands = self.limbs[limb], targets.dt, targets.stands[:, limb]
-        end, rotation = self.raised(targets, limb)
-        raw, path = end.copy(), targets.turns.get(name)
-        runs, held, hand = intervals(stands), targets.held[:, limb], limb not in self._feet
+        raw, path = end.copy(), targets.turns[name] if limb in self.flat else np.zeros(0)
+        rotation, runs, held, hand = path.copy(), intervals(stands), targets.held[:, limb], limb not in self._feet
         held[:] = stands
         for number, (a, b) in enumerate(runs):
             place, heading = self.standing_place(targets, limb, slice(a, b))
             end[a:b] = place
-            if rotation is not None and heading is not None:
+            if heading is not None:
                 rotation[a:b] = heading
             first, last = number == 0, number + 1 == len(runs)
             free = (0 if first else runs[number - 1][1], len(stands) if last else runs[number + 1][0])
@@ -155,38 +151,39 @@ class Planner:
                 span = np.arange(max(a - steps, 0), a) if comes else np.arange(b, min(b + steps, len(stands)))
                 if len(span):
                     share = minimum_jerk((a - span if comes else span - b + 1) / (steps + 1))
-                    end[span], turned = toward(place, heading, raw[span], None if path is None else path[span], share)
-                    if rotation is not None and turned is not None:
-                        rotation[span] = turned
+                    end[span] = place + share[:, None] * (raw[span] - place)
+                    if heading is not None:
+                        rotation[span] = turned_toward(heading, path[span], share)
             before = max(a - round(BEFORE / dt), free[0])
             held[before:a] = True
             targets.lies[before:b, limb] = hand and bool(place[2] <= self._own[limb].radius)
         targets.chains[:, limb, 3] = end
-        if rotation is not None:
+        if len(rotation):
             targets.turns[name] = rotation
 
-    def raised(self, targets: Targets, limb: int) -> tuple[Array, Array | None]:
-        """Positions and rotations of a limb's contact frame, clear of the ground."""
-        end, rotation = targets.chains[:, limb, 3].copy(), targets.turns.get(self.limbs[limb])
-        end[:, 2] += lift(self._lowest(limb, end, rotation))
-        return end, None if rotation is None else rotation.copy()
+    def raised(self, targets: Targets) -> Array:
+        """Positions of limbs' contact frames, clear of the ground [ticks, limbs, 3] [m]."""
+        ends: Array = targets.chains[:, :, 3].copy()
+        lowest = ends[:, :, 2] - self._radii
+        for limb in self.flat:
+            lowest[:, limb] = self._lowest(limb, ends[:, limb], targets.turns[self.limbs[limb]])
+        ends[:, :, 2] += lift(lowest)
+        return ends
 
-    def _lowest(self, limb: int, end: Array, rotation: Array | None) -> Array:
-        """Height of the lowest point of a foot, or of a hand's ball [ticks] [m]."""
-        robot = self._own[limb]
-        if rotation is None or robot.contact != "flat":
-            return np.asarray(end[:, 2] - robot.radius)
+    def _lowest(self, limb: int, end: Array, rotation: Array) -> Array:
+        """Height of the lowest point of a flat foot [ticks] [m]."""
         # A product a tick: one of all would start threads
-        return np.asarray((rotation[:, 2, None] @ np.ascontiguousarray(robot.surface.T)).min(axis=2)[:, 0] + end[:, 2])
+        heights = rotation[:, 2, None] @ np.ascontiguousarray(self._own[limb].surface.T)
+        return np.asarray(heights.min(axis=2)[:, 0] + end[:, 2])
 
     def standing_place(self, targets: Targets, limb: int, ticks: slice) -> tuple[Array, Array | None]:
         """Where a stance stands, of all of its ticks, and the rotation of a foot: level, or on its toes or heel."""
         robot, chain = self._own[limb], targets.chains[ticks, limb]
-        place, rotation = _median(chain[:, 3]), targets.turns.get(self.limbs[limb])
-        if robot.contact != "flat" or rotation is None:
+        place = _median(chain[:, 3])
+        if limb not in self.flat:
             place[2] = robot.radius + _grounded(place[2] - robot.radius)
             return place, None
-        rotation = rotation[ticks]
+        rotation = targets.turns[self.limbs[limb]][ticks]
         forward = rotation[:, :, 0].mean(axis=0)
         standing = exponential(np.array([[0.0, 0.0, float(np.arctan2(forward[1], forward[0]))]]))[0]
         place[2] = _grounded(_median(chain[:, 2, 2]) - robot.ankle)
@@ -219,7 +216,7 @@ class Planner:
         """Where ankles of legs, or ends of those on points, are planned [ticks, feet, 3] [m]."""
         out = targets.chains[:, self._feet, 3]
         for number, limb in enumerate(self._feet):
-            if limb in self._flat:
+            if limb in self.flat:
                 out[:, number] += self._ankle[limb] * targets.turns[self.limbs[limb]][:, :, 2]
         return out
 
@@ -263,12 +260,17 @@ def balanced(targets: Targets) -> Array:
 
 def _pitched(angles: Array) -> Array:
     """Turns about a foot's axis to the left [n, 3, 3]."""
-    return exponential(angles[:, None] * np.array([0.0, 1.0, 0.0]))
+    out = np.zeros((len(angles), 3, 3))
+    out[:, 0, 0] = out[:, 2, 2] = np.cos(angles)
+    out[:, 0, 2] = np.sin(angles)
+    out[:, 2, 0], out[:, 1, 1] = -out[:, 0, 2], 1.0
+    return out
 
 
 def _median(values: Array) -> Array:
     """Over the ticks: as numpy's, which takes ten times as long of so few."""
-    ordered, count = np.sort(values, axis=0), len(values)
+    count = len(values)
+    ordered = np.sort(values, axis=0) if count > 1 else values
     return np.asarray(0.5 * (ordered[(count - 1) // 2] + ordered[count // 2]))
 
 
