@@ -171,7 +171,7 @@ def one_of(field: str, value: Any, choices: Iterable[str]) -> str:
     return value
 
 
-class Named(dict[str, T]):
+class Entries(dict[str, T]):
     """What is known of each name of ``field``: another name is no KeyError, but raises an UnknownNameError."""
 
     def __init__(self, field: str, entries: Mapping[str, T]) -> None:

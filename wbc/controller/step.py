@@ -25,7 +25,7 @@ from wbc.tick.outcome import (
     certificates,
     scales,
 )
-from wbc.validation import Array, Named
+from wbc.validation import Array, Entries
 
 if TYPE_CHECKING:
     from wbc.explain import Explanation
@@ -112,7 +112,7 @@ class Step:
         self._require("forces", "torque")
         layout, variables, p = self._context.layout, self._part("v"), self._part("p")
         closed = {name: p[layout.blocks[name].slots[CLOSED].span] for name in layout.forces}
-        return Named("forces", {name: variables[span] * closed[name] for name, span in layout.forces.items()})
+        return Entries("forces", {name: variables[span] * closed[name] for name, span in layout.forces.items()})
 
     @property
     def loop_forces(self) -> Mapping[str, Array]:
@@ -171,7 +171,7 @@ class Step:
             )
             for b in self._context.layout.of_form("task")
         }
-        return Named("residuals", found)
+        return Entries("residuals", found)
 
     @property
     def faded(self) -> tuple[str, ...]:
@@ -199,11 +199,11 @@ class Step:
         """
         values = self._part("lost")
         blocks = self._context.layout.of_form("rows")
-        return Named("lost", {b.entry.name: values[b.span] for b in blocks if bends(b.entry)})
+        return Entries("lost", {b.entry.name: values[b.span] for b in blocks if bends(b.entry)})
 
     def _by_margin(self, field: str, part: str) -> Mapping[str, Array]:
         values = self._part(part)
-        return Named(field, {b.entry.name: values[b.margins] for b in self._context.layout.of_form("margins")})
+        return Entries(field, {b.entry.name: values[b.margins] for b in self._context.layout.of_form("margins")})
 
     @property
     def binding(self) -> tuple[Binding, ...]:
@@ -259,7 +259,7 @@ class Step:
         0 where the tick brakes. docs/soft.md.
         """
         found = scales(self._context.layout, self._part("v"), self._part("error"))
-        return Named("scales", dict.fromkeys(found, 0.0) if self.status is Status.BRAKED else found)
+        return Entries("scales", dict.fromkeys(found, 0.0) if self.status is Status.BRAKED else found)
 
     @property
     def answered_by(self) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from wbc.log import Log, LogFile, LogFileError
 from wbc.log.log import joined
 from wbc.tick.outcome import STATUSES
-from wbc.validation import Array, Named
+from wbc.validation import Array, Entries
 
 #: Version that is written
 FORMAT = 3
@@ -91,7 +91,7 @@ class Recording(LogFile):
             RecordingError: it is of an older version, which kept no names, residuals and margins.
         """
         places, p = self._names("inputs"), self["p"]
-        return Named("inputs", {f"{item}.{name}": p[:, start:stop] for item, name, start, stop, _ in places})
+        return Entries("inputs", {f"{item}.{name}": p[:, start:stop] for item, name, start, stop, _ in places})
 
     @property
     def units(self) -> dict[str, str]:
@@ -178,4 +178,4 @@ class Recording(LogFile):
 
     def _by_item(self, field: str, part: str) -> dict[str, Array]:
         rows, numbers = self._names(part), self[part]
-        return Named(field, {item: numbers[:, [row[0] == item for row in rows]] for item, *_ in rows})
+        return Entries(field, {item: numbers[:, [row[0] == item for row in rows]] for item, *_ in rows})

@@ -13,7 +13,7 @@ from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
 from wbc.stack.memory import Memory
 from wbc.tick.native import CompiledTick
-from wbc.validation import Array, Named
+from wbc.validation import Array, Entries
 
 _Part = Callable[[bytes], Array]
 
@@ -55,7 +55,7 @@ class Context:
         ends = np.cumsum([self.layout.loop_forces.start, *(len(basis) for basis in loops.bases)]).tolist()
         parts = (variables[..., first:end] for first, end in itertools.pairwise(ends))
         triples = zip(loops.loops, loops.bases, parts, strict=True)
-        return Named("loop_forces", {loop.name: part @ basis for loop, basis, part in triples})
+        return Entries("loop_forces", {loop.name: part @ basis for loop, basis, part in triples})
 
     @cached_property
     def general(self) -> list[tuple[Block, int]]:
