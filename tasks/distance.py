@@ -41,8 +41,8 @@ class Distance(Task):
         point: the point of the other frame [m].
         point_velocity: its rate in the axes of the other frame [m/s]. Default 0.
 
-    What it cannot do: keep two bodies apart (``Obstacle`` does). With a target of 0 a tick oversteps; to bring two
-    points together command a position (``EndEffector`` with ``relative_to``).
+    What it cannot do: keep two bodies apart (``Obstacle`` does). To bring two points together command a position
+    (``EndEffector`` with ``relative_to``): with a target of 0 a tick oversteps in a stack that is not ``calm``.
 
     Example:
         >>> import wbc

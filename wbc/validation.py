@@ -171,6 +171,17 @@ def one_of(field: str, value: Any, choices: Iterable[str]) -> str:
     return value
 
 
+class Entries(dict[str, T]):
+    """What is known of each name of ``field``: another name is no KeyError, but raises an UnknownNameError."""
+
+    def __init__(self, field: str, entries: Mapping[str, T]) -> None:
+        super().__init__(entries)
+        self.field = field
+
+    def __missing__(self, name: Any) -> T:
+        raise UnknownNameError(self.field, name, self)
+
+
 def instance(field: str, value: Any, kind: type[T] | tuple[type[T], ...], expected: str) -> T:
     """An object of a class, or of one of several; ``expected``: what to say of it."""
     if not isinstance(value, kind):

@@ -8,9 +8,11 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+import wbc
 from tests.calm.best import best, cost, random_starts
 from tests.calm.scenes import built, machine, run, still, tip_pose
 from tests.repeats import covering
+from wbc.tasks import Distance, JointLimits, Posture
 
 #: Reach of the arm from its base, about [m]
 REACH = {"panda": 0.86, "ur5": 0.85, "talos_left_arm": 0.75}
@@ -76,6 +78,26 @@ def test_without_limits_of_acceleration(name: str, gain: float) -> None:
     done = run(controller, gain, still(far_target(name, DIRECTIONS[name][0])), 1000)
     assert done.flips(100, above=1e-9) == 0
     assert np.abs(done.v[900:]).max() < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "tip", "point", "target"),
+    [("tiago", "arm_tool_link", (1.0, 1.0, 3.0), 0.3), ("ur5", "tool0", (0.3, 0.2, 0.5), 0.0)],
+)
+def test_a_distance_comes_to_rest(name: str, tip: str, point: tuple[float, float, float], target: float) -> None:
+    """Out of reach above a base that nothing limits, and where the line between the points has no direction."""
+    stack = wbc.Stack(wbc.robots.load(name), 0.01).add(Distance(tip, point=point), name="range")
+    controller = stack.add(Posture(), name="posture", weight=1e-3).add(JointLimits()).compile(backend="vm")
+    q = stack.robot.integrate(stack.robot.neutral, np.full(stack.robot.nv, 0.2), 1.0)
+    controller.reset(q)
+    controller["range"].target = target
+    v = np.zeros((1500, stack.robot.nv))
+    for tick in range(len(v)):
+        step = controller.step(q)
+        assert step.status == "solved"
+        q, v[tick] = step.q_next, step.v
+    assert np.abs(v).max() < 10.0
+    assert np.abs(v[-100:]).max() < 1e-4
 
 
 def test_the_linear_model_chatters_there() -> None:

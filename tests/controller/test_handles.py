@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import pytest
 
@@ -13,7 +14,7 @@ from wbc.controller.handle import UnknownValueError
 from wbc.errors import DuplicateNameError, UnknownNameError
 from wbc.pages import stub
 from wbc.stack.layout import Layout
-from wbc.tasks import EndEffector, Posture, registry
+from wbc.tasks import EndEffector, Posture, WorkspaceBox, registry
 from wbc.tasks.inputs import SENSED
 
 #: Classes whose inputs their declaration names, and what only stacks add
@@ -50,6 +51,23 @@ def test_a_misspelt_value_fails_with_the_nearest_name() -> None:
             handle.get("gian")
     controller[hand].gain = 3.0
     assert controller["hand"].get("gain") == 3.0
+
+
+def test_a_misspelt_item_of_a_report_fails_with_the_nearest_name(tmp_path: Path) -> None:
+    stack = wbc.Stack(robot("panda"), 0.01).add(EndEffector("panda_hand_tcp"), name="hand")
+    stack.add(WorkspaceBox("panda_hand", upper=(9.0, 9.0, 9.0)), name="box")
+    controller = stack.compile(backend="vm")
+    with controller.record(tmp_path / "ticks.npz"):
+        step = controller.step(controller.stack.robot.neutral)
+    recording, batch = wbc.Recording(tmp_path / "ticks.npz"), controller.batch(2).step(step.q_next)
+    for report in (step, recording, batch):
+        for field, name, near in (("residuals", "hnad", "hand"), ("margins", "bax", "box")):
+            entries = getattr(report, field)
+            assert entries.get(name) is None
+            with pytest.raises(UnknownNameError, match=f"{field}: unknown name, did you mean '{near}'"):
+                entries[name]
+    with pytest.raises(UnknownNameError, match=r"inputs: unknown name, did you mean 'hand\.target'"):
+        recording.inputs["hand.traget"]
 
 
 def test_an_item_is_found_as_it_was_added() -> None:

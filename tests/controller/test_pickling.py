@@ -70,6 +70,9 @@ def test_robots(name: str) -> None:
     machine = replace(wbc.robots.load(name), couplings=(Coupling(2, 1, 0.5, 0.1),))
     before = machine.fingerprint
     assert machine.dof_names
+    for other in (machine, through_pickle(machine), copy.deepcopy(machine)):
+        with pytest.raises(ValueError, match="read-only"):
+            other.neutral[0] += 0.3
     for other in (through_pickle(machine), copy.deepcopy(machine)):
         assert set(vars(other)) == {f.name for f in dataclasses.fields(Robot)}
         assert other.model == machine.model

@@ -127,6 +127,19 @@ def test_fingers_that_mimic_follow() -> None:
             stack.plan(start, end)
 
 
+def test_a_slow_follower_slows_its_leader() -> None:
+    robot = wbc.robots.load("panda", lock=())
+    c, goal = robot.couplings[0], robot.neutral.copy()
+    goal[[robot.position_index[dof] for dof in (c.leader, c.follower)]] += (0.03, 0.03 * c.ratio)
+    slow = {robot.dof_names[c.follower]: 0.01}
+    for limits in ({"velocity": slow}, {"acceleration": slow}):
+        path = wbc.Stack(robot.with_limits(**limits), dt=0.01).add(wbc.tasks.JointLimits()).plan(robot.neutral, goal)
+        for law in (path.law(), path.law(jerk=True)):
+            rates = path.configurations(law, np.linspace(0.0, law.duration, 500))[1][:, c.follower]
+            rates = np.diff(rates) / law.duration * 499.0 if "acceleration" in limits else rates
+            assert 0.0099 < np.abs(rates).max() < 0.01 * (1.0 + 1e-6)
+
+
 @pytest.mark.filterwarnings("error:divide")
 def test_a_follower_that_stands_still_limits_nothing(tmp_path: Path) -> None:
     joints = "".join(

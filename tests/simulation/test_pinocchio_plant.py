@@ -183,7 +183,7 @@ def ball_on_ground(
 
 def test_a_body_rests_on_the_ground_and_friction_holds_it() -> None:
     robot, plant = ball_on_ground(stiffness=2e4, damping=200.0, friction=0.5)
-    q = robot.neutral
+    q = robot.neutral.copy()
     q[2] = 0.1
     plant.reset(q, 0.0)
     plant.advance(1.0)
@@ -218,7 +218,7 @@ def test_a_body_on_a_surface(distance: Distance, friction: float) -> None:
     side /= np.linalg.norm(side)
     pull = 9.81 * (np.sin(0.25) * side - np.cos(0.25) * n)
     robot, plant = ball_on_ground(pull, distance=distance, stiffness=2e4, damping=200.0, friction=friction)
-    q = robot.neutral
+    q = robot.neutral.copy()
     q[:3] = place
     plant.reset(q, 0.0)
     plant.advance(0.2)

@@ -14,7 +14,7 @@ from tests.repeats import covering
 from wbc.symbolic.curvature import AppliedForce, curvature
 from wbc.symbolic.kinematics import Kinematics
 from wbc.symbolic.tracer import Tracer
-from wbc.tasks import AxisAlign
+from wbc.tasks import AxisAlign, Distance
 
 FRAMES = {
     "panda": "panda_hand_tcp",
@@ -63,6 +63,38 @@ def test_an_expression_pulls_at_what_it_is_made_of() -> None:
     plain = ca.hessian(2.0 * kinematics.pose(FRAMES["panda"]).position[2], kinematics.q)[0]
     difference = ca.Function("d", [kinematics.q], [K - plain])
     assert np.abs(np.array(difference(robot.neutral))).max() < 1e-12
+
+
+@pytest.mark.parametrize(("name", "other"), [("talos", "torso_2_link"), ("tiago", "world")])
+def test_a_distance_bends_across_its_line(name: str, other: str) -> None:
+    """The force along the line of two points turns with it, wherever the points come from."""
+    robot = wbc.robots.load(name, shapes="none")
+    model, data, rng = robot.model, robot.model.createData(), np.random.default_rng(5)
+    q = pin.integrate(model, robot.neutral, 0.3 * rng.normal(size=robot.nv))
+    offset, point = rng.normal(size=(2, 3))
+
+    def slope(at: np.ndarray) -> np.ndarray:
+        pin.computeJointJacobians(model, data, at)
+        pin.updateFramePlacements(model, data)
+        ends = []
+        for frame, place in ((FRAMES[name], offset), (other, point)):
+            index = model.getFrameId(frame) if frame != "world" else 0
+            arm = data.oMf[index].rotation @ place
+            rows = pin.getFrameJacobian(model, data, index, pin.LOCAL_WORLD_ALIGNED)
+            ends.append((data.oMf[index].translation + arm, rows[:3] - pin.skew(arm) @ rows[3:]))
+        between = ends[0][0] - ends[1][0]
+        return np.asarray((ends[0][1] - ends[1][1]).T @ between / np.linalg.norm(between))
+
+    columns = [
+        (slope(pin.integrate(model, q, d)) - slope(pin.integrate(model, q, -d))) / (2 * STEP)
+        for d in STEP * np.eye(robot.nv)
+    ]
+    wanted = 0.5 * (np.array(columns) + np.array(columns).T)
+    kinematics = Kinematics(model)
+    tracer, item = Tracer(kinematics), Distance(FRAMES[name], other, tuple(offset), tuple(point))
+    error = item.error(robot, tracer, {"target": ca.SX(0), "point": ca.SX(ca.DM(point))})
+    found = np.array(ca.Function("K", [kinematics.q], [curvature(kinematics, tracer.forces(error))])(q))
+    assert np.abs(found - wanted).max() < 1e-7 * max(1.0, float(np.abs(wanted).max()))
 
 
 @cache

@@ -52,6 +52,20 @@ def test_tiny_moves_and_none_at_all(synchronisation):
     assert law.certificate.ratio == 0.0
 
 
+@pytest.mark.parametrize("straight", [False, True])
+def test_a_jerk_limit_that_means_none(straight):
+    """Jerk phases of microseconds late in long laws, of which doubles hold the time to some digits only."""
+    rng = np.random.default_rng(4)
+    for _ in range(60):
+        start, target = rng.normal(size=(2, int(rng.integers(1, 4))))
+        v, a = 10.0 ** rng.uniform(-2.0, 1.0, (2, len(start)))
+        law = jerk_limited(start, target, velocity=v, acceleration=a, jerk=1e6 * a, straight=straight)
+        assert law.certificate.satisfied, (v, a, law.certificate)
+        t = np.linspace(0.0, law.duration, 10)
+        np.testing.assert_allclose(law.at(law.duration).position, target, atol=1e-12)
+        assert (np.abs(law.jerk(t)) <= 1e6 * a * (1.0 + 1e-6)).all()
+
+
 def test_straight_lines_are_straight_whatever_the_limits_are():
     rng = np.random.default_rng(5)
     for k in range(100):

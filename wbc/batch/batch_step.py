@@ -16,7 +16,7 @@ from wbc.errors import CommandError, SolverError
 from wbc.stack.layout import CLOSED
 from wbc.tick.context import Context
 from wbc.tick.outcome import STATUSES, Status
-from wbc.validation import Array
+from wbc.validation import Array, Entries
 
 #: Place of each status in ``list(Status)``, by the tick's flag
 _CODES = np.array([list(Status).index(status) for status in STATUSES], np.int8)
@@ -127,10 +127,8 @@ class BatchStep:
         """
         self._require_torque("forces")
         layout, variables, p = self._context.layout, self._part("v"), self._given("p")
-        return {
-            name: variables[:, span] * p[:, layout.blocks[name].slots[CLOSED].span]
-            for name, span in layout.forces.items()
-        }
+        closed = {name: p[:, layout.blocks[name].slots[CLOSED].span] for name in layout.forces}
+        return Entries("forces", {name: variables[:, span] * closed[name] for name, span in layout.forces.items()})
 
     @property
     def loop_forces(self) -> Mapping[str, Array]:
@@ -151,13 +149,13 @@ class BatchStep:
     def residuals(self) -> Mapping[str, Array]:
         """Errors of every task before the step by its name [n, rows], in the rows' units."""
         error = self._part("error")
-        return {block.entry.name: error[:, block.span] for block in self._context.layout.of_form("task")}
+        return Entries("residuals", {b.entry.name: error[:, b.span] for b in self._context.layout.of_form("task")})
 
     @property
     def margins(self) -> Mapping[str, Array]:
         """Margins of every margin constraint before the step by its name [n, rows]."""
         margin = self._part("margin")
-        return {block.entry.name: margin[:, block.margins] for block in self._context.layout.of_form("margins")}
+        return Entries("margins", {b.entry.name: margin[:, b.margins] for b in self._context.layout.of_form("margins")})
 
     @property
     def slacks(self) -> Array:

@@ -25,7 +25,7 @@ from wbc.tick.outcome import (
     certificates,
     scales,
 )
-from wbc.validation import Array
+from wbc.validation import Array, Entries
 
 if TYPE_CHECKING:
     from wbc.explain import Explanation
@@ -111,9 +111,8 @@ class Step:
         """
         self._require("forces", "torque")
         layout, variables, p = self._context.layout, self._part("v"), self._part("p")
-        return {
-            name: variables[span] * p[layout.blocks[name].slots[CLOSED].span] for name, span in layout.forces.items()
-        }
+        closed = {name: p[layout.blocks[name].slots[CLOSED].span] for name in layout.forces}
+        return Entries("forces", {name: variables[span] * closed[name] for name, span in layout.forces.items()})
 
     @property
     def loop_forces(self) -> Mapping[str, Array]:
@@ -166,12 +165,13 @@ class Step:
     def residuals(self) -> Mapping[str, Residual]:
         """Error of every task before the step, by name, with units."""
         error = self._part("error")
-        return {
+        found = {
             b.entry.name: Residual(
                 error[b.span], tuple(r.unit for r in b.rows), tuple(r.label for r in b.rows), b.entry.level
             )
             for b in self._context.layout.of_form("task")
         }
+        return Entries("residuals", found)
 
     @property
     def faded(self) -> tuple[str, ...]:
@@ -184,12 +184,12 @@ class Step:
     @property
     def margins(self) -> Mapping[str, Array]:
         """Margins h of every margin constraint before the step, by name."""
-        return self._by_margin("margin")
+        return self._by_margin("margins", "margin")
 
     @property
     def margins_ahead(self) -> Mapping[str, Array]:
         """Margins h(q (+) v dt) after the step, with moving obstacles moved on: part of the certificate."""
-        return self._by_margin("ahead")
+        return self._by_margin("margins_ahead", "ahead")
 
     @property
     def lost(self) -> Mapping[str, Array]:
@@ -198,11 +198,12 @@ class Step:
         docs/reach.md. Of accelerations what loops are open by at :attr:`q_next`.
         """
         values = self._part("lost")
-        return {b.entry.name: values[b.span] for b in self._context.layout.of_form("rows") if bends(b.entry)}
+        blocks = self._context.layout.of_form("rows")
+        return Entries("lost", {b.entry.name: values[b.span] for b in blocks if bends(b.entry)})
 
-    def _by_margin(self, part: str) -> Mapping[str, Array]:
+    def _by_margin(self, field: str, part: str) -> Mapping[str, Array]:
         values = self._part(part)
-        return {b.entry.name: values[b.margins] for b in self._context.layout.of_form("margins")}
+        return Entries(field, {b.entry.name: values[b.margins] for b in self._context.layout.of_form("margins")})
 
     @property
     def binding(self) -> tuple[Binding, ...]:
@@ -258,7 +259,7 @@ class Step:
         0 where the tick brakes. docs/soft.md.
         """
         found = scales(self._context.layout, self._part("v"), self._part("error"))
-        return dict.fromkeys(found, 0.0) if self.status is Status.BRAKED else found
+        return Entries("scales", dict.fromkeys(found, 0.0) if self.status is Status.BRAKED else found)
 
     @property
     def answered_by(self) -> str:

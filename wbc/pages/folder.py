@@ -38,7 +38,7 @@ from the next tick on. A bad value raises a typed error of `wbc.errors` that nam
 
 | Input | Of | Meaning |
 |---|---|---|
-| `gain` [1/s] | tasks | >= 0; the error decays like exp(-gain t) where nothing hinders it |
+| `gain` [1/s] | tasks | >= 0; the error decays like exp(-gain t) where nothing hinders it; above 1/dt it changes sign |
 | `weight` | tasks | >= 0; of all rows, against other tasks; first value: that of `stack.add` |
 | `rate` [1/s] | margins | above 0, at most 1/dt; h decays no faster than exp(-rate t) |
 | `enabled` | all | False: as if the item were not there |

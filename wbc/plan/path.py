@@ -193,7 +193,8 @@ class PlannedPath:
 
     def motion_limits(self) -> tuple[Array, Array]:
         """Speeds and accelerations of the coordinates [n]."""
-        coordinates, limits = self.coordinates, self.stack.robot.limits
+        coordinates, robot = self.coordinates, self.stack.robot
+        limits = robot.coupled(robot.limits)
         fast, brisk = coordinates.rates(limits.velocity), coordinates.rates(limits.acceleration)
         fast = np.where(np.isfinite(fast), fast, UNLIMITED * coordinates.scale)
         return fast, np.where(np.isfinite(brisk), brisk, fast / RAMP)

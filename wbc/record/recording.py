@@ -11,7 +11,7 @@ import numpy as np
 from wbc.log import Log, LogFile, LogFileError
 from wbc.log.log import joined
 from wbc.tick.outcome import STATUSES
-from wbc.validation import Array
+from wbc.validation import Array, Entries
 
 #: Version that is written
 FORMAT = 3
@@ -71,7 +71,7 @@ class Recording(LogFile):
         Raises:
             RecordingError: it is of an older version, which kept no names, residuals and margins.
         """
-        return self._by_item("error")
+        return self._by_item("residuals", "error")
 
     @property
     def margins(self) -> dict[str, Array]:
@@ -80,7 +80,7 @@ class Recording(LogFile):
         Raises:
             RecordingError: it is of an older version, which kept no names, residuals and margins.
         """
-        return self._by_item("margin")
+        return self._by_item("margins", "margin")
 
     @property
     def inputs(self) -> dict[str, Array]:
@@ -91,7 +91,7 @@ class Recording(LogFile):
             RecordingError: it is of an older version, which kept no names, residuals and margins.
         """
         places, p = self._names("inputs"), self["p"]
-        return {f"{item}.{name}": p[:, start:stop] for item, name, start, stop, _ in places}
+        return Entries("inputs", {f"{item}.{name}": p[:, start:stop] for item, name, start, stop, _ in places})
 
     @property
     def units(self) -> dict[str, str]:
@@ -176,6 +176,6 @@ class Recording(LogFile):
             for place in range(start, stop):
                 yield f"{item}.{name}" + (f".{place - start}" if stop - start > 1 else ""), unit, "p", place
 
-    def _by_item(self, part: str) -> dict[str, Array]:
+    def _by_item(self, field: str, part: str) -> dict[str, Array]:
         rows, numbers = self._names(part), self[part]
-        return {item: numbers[:, [row[0] == item for row in rows]] for item, *_ in rows}
+        return Entries(field, {item: numbers[:, [row[0] == item for row in rows]] for item, *_ in rows})

@@ -124,6 +124,7 @@ class Robot:
                     raise RangeError(f"robot.{name}", dof, f"expected an index into v, 0 to {self.nv - 1}")
         neutral = self.neutral if np.size(self.neutral) else algebra(self.tree).neutral(self.tree)
         object.__setattr__(self, "neutral", self.configuration("robot.neutral", neutral))
+        self.neutral.flags.writeable = False
 
     def __repr__(self) -> str:
         return f"<Robot {self.name!r}: {len(self.joint_names)} joints, nq {self.nq}, nv {self.nv}, {self.base} base>"
@@ -133,6 +134,7 @@ class Robot:
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         pickling.restore(self, state, {f.name for f in fields(self)})
+        pickling.freeze(self)
 
     @property
     def tree(self) -> Any:

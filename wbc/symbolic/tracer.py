@@ -118,6 +118,7 @@ class Tracer:
                     lambda: kinematics.center_of_mass,
                     ca.SX.eye(3),
                     lambda: kinematics.center_of_mass_jacobian,
+                    places=True,
                     forces=lambda force: (AppliedForce("mass", WORLD, force),),
                     twist=lambda motion: motion.center_of_mass,
                 )
@@ -473,9 +474,9 @@ class Placeholder:
     The rate is kept as two factors because ``(partial @ motion) @ jacobian`` is much smaller than
     ``partial @ (motion @ jacobian)``. Kinematics are built when they are needed, so that an item can be traced
     (to count its rows, to make its cache key) without them. ``inner``: value and motion are in other placeholders.
-    ``turns``: it is the rotation of a frame, by which other forces turn. ``twist``: ``jacobian @ v``, and its rate
-    where v does not change, from a recursion over the bodies; None: from the Jacobian. ``forces``: what a force along
-    the rate, given as a 3-vector in the axes of ``jacobian``, does to the robot.
+    ``places``: it is where a frame or the centre of mass is, with which forces change. ``twist``:
+    ``jacobian @ v``, and its rate where v does not change, from a recursion over the bodies; None: from the Jacobian.
+    ``forces``: what a force along the rate, given as a 3-vector in the axes of ``jacobian``, does to the robot.
     """
 
     name: str
@@ -484,7 +485,7 @@ class Placeholder:
     motion: ca.SX
     jacobian: Callable[[], ca.SX]
     inner: bool = False
-    turns: bool = False
+    places: bool = False
     forces: Callable[[ca.SX], tuple[AppliedForce, ...]] = lambda force: ()
     twist: Callable[[MotionExpressions], tuple[ca.SX, ca.SX]] | None = None
 
@@ -504,6 +505,7 @@ def of_frame(kinematics: Kinematics, frame: str, pose: Pose) -> list[Placeholder
         lambda: kinematics.pose(frame).position,
         ca.SX.eye(3),
         lambda: kinematics.jacobian(frame)[:3, :],
+        places=True,
         forces=lambda force: (AppliedForce("force", frame, force),),
         twist=lambda motion: motion.part(frame, slice(0, 3)),
     )
@@ -513,7 +515,7 @@ def of_frame(kinematics: Kinematics, frame: str, pose: Pose) -> list[Placeholder
         lambda: ca.vec(kinematics.pose(frame).rotation),
         rotation_rate(pose.rotation),
         lambda: kinematics.jacobian(frame)[3:, :],
-        turns=True,
+        places=True,
         forces=lambda torque: (AppliedForce("torque", frame, torque),),
         twist=lambda motion: motion.part(frame, slice(3, 6)),
     )
@@ -526,11 +528,11 @@ def turning(
     expand: Callable[[ca.SX], ca.SX],
     nv: int,
 ) -> ca.SX:
-    """What forces and torques add to the curvature because they turn with frames, nv x nv:
+    """What forces and torques add to the curvature because they change with where frames are, nv x nv:
 
         symmetric part of  sum over k, l of  J_k' (dw_k/ds_l) J_l        w_k: force along the rate of placeholder k
 
-    Pairs without a rotation are left out: those are errors with curvature of their own.
+    Pairs without a place are left out: those are errors with curvature of their own.
 
     Args:
         works: placeholders that an expression depends on, each with its force. expand: puts the kinematics in.
@@ -539,7 +541,7 @@ def turning(
     for cause in placeholders:
         felt = ca.SX(nv, 3)
         for force, work in works:
-            if not (force.turns or cause.turns) or not cause.motion.nnz():
+            if not (force.places or cause.places) or not cause.motion.nnz():
                 continue
             change = ca.sparsify(ca.jacobian(work, cause.symbol) @ cause.motion)
             if change.nnz():

@@ -13,7 +13,7 @@ from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Block, Layout
 from wbc.stack.memory import Memory
 from wbc.tick.native import CompiledTick
-from wbc.validation import Array
+from wbc.validation import Array, Entries
 
 _Part = Callable[[bytes], Array]
 
@@ -54,7 +54,8 @@ class Context:
         loops = self.stack.robot.loops
         ends = np.cumsum([self.layout.loop_forces.start, *(len(basis) for basis in loops.bases)]).tolist()
         parts = (variables[..., first:end] for first, end in itertools.pairwise(ends))
-        return {loop.name: part @ basis for loop, basis, part in zip(loops.loops, loops.bases, parts, strict=True)}
+        triples = zip(loops.loops, loops.bases, parts, strict=True)
+        return Entries("loop_forces", {loop.name: part @ basis for loop, basis, part in triples})
 
     @cached_property
     def general(self) -> list[tuple[Block, int]]:

@@ -184,7 +184,12 @@ class Timing:
         powers = np.arange(self.degree, -1, -1)
         found = [np.zeros(0)]
         for i in np.flatnonzero(some):
-            for place in ordered[(ordered > low[i]) & (ordered < high[i])]:
+            passed = ordered[(ordered > low[i]) & (ordered < high[i])]
+            if self.degree == 1:
+                slope, start = self.coefficients[:, i]
+                found.append(self.times[i] + (passed - start) / slope)
+                continue
+            for place in passed:
                 shifted = self.coefficients[:, i] * spans[i] ** powers
                 shifted[-1] -= place
                 # What a leading power adds below rounding would only spoil the roots
