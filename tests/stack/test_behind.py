@@ -181,16 +181,6 @@ def test_a_compiler_that_fails_leaves_them_as_they_are(
     assert controller.settled().tier == "vm"
 
 
-def test_what_it_says(gate: threading.Event, caplog: pytest.LogCaptureFixture) -> None:
-    with caplog.at_level(logging.INFO, "wbc"):
-        controller = small.stack().compile()
-        gate.set()
-        assert changes(controller)
-    assert [r.levelname for r in caplog.records if "change over with their next tick" in r.getMessage()] == ["INFO"]
-    with pytest.raises(ShapeError, match="wait"):
-        small.stack().compile(wait="no")  # type: ignore[arg-type]
-
-
 def test_a_loop_may_forbid_the_change(gate: threading.Event) -> None:
     controller = small.stack().compile()
     controller.may_change = False
@@ -208,11 +198,15 @@ def test_a_loop_may_forbid_the_change(gate: threading.Event) -> None:
         controller.may_change = "no"  # type: ignore[assignment]
 
 
-def test_who_waits_has_native_code(gate: threading.Event) -> None:
-    first = small.stack().compile()
-    gate.set()
-    assert small.stack().compile(wait=True).tier == "native"
-    assert first.settled().tier == "native"
+def test_who_waits_has_native_code(gate: threading.Event, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.INFO, "wbc"):
+        first = small.stack().compile()
+        gate.set()
+        assert small.stack().compile(wait=True).tier == "native"
+        assert first.settled().tier == "native"
+    assert [r.levelname for r in caplog.records if "change over with their next tick" in r.getMessage()] == ["INFO"]
+    with pytest.raises(ShapeError, match="wait"):
+        small.stack().compile(wait="no")  # type: ignore[arg-type]
     assert first.batch(2).step(small.Q).v[1].tobytes() == first.clone().step(small.Q).v.tobytes()
 
 
