@@ -1,7 +1,7 @@
 """Prints for which platforms and Pythons everything that ``pip install wbc`` needs is to be had as wheels.
 
-pip looks through all releases of all packages for each of them, 4 to 8 s of the processor: ``--ends`` asks for the oldest
-and the newest Python.
+pip looks through all releases of all packages for each of them, 4 to 8 s of the processor: ``--ends`` asks for the
+oldest and the newest Python.
 
 Exit status: 0 where that is so for all of them, 1 where not, 3 where the package index could not be asked.
 """
