@@ -62,8 +62,7 @@ class DivergentComponent(Task):
     weights: tuple[float, ...] | None = (1.0, 1.0, 0.0)
 
     def __post_init__(self) -> None:
-        number = validation.scalar("DivergentComponent.omega", self.omega, low=0.0, open_low=True, unit="1/s")
-        object.__setattr__(self, "omega", number)
+        validation.own_scalars(self, "omega", low=0.0, open_low=True, unit="1/s")
         object.__setattr__(self, "weights", checked_weights("DivergentComponent.weights", self.weights, 3))
 
     def validate(self, robot: Robot) -> None:

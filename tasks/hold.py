@@ -73,7 +73,7 @@ class Hold(Constraint):
 
     def __post_init__(self) -> None:
         validation.one_of("Hold.kind", self.kind, HELD_KINDS)
-        object.__setattr__(self, "gain", validation.scalar("Hold.gain", self.gain, low=0.0, unit="1/s"))
+        validation.own_scalars(self, "gain", low=0.0, unit="1/s")
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         part = self.kind if self.kind in ("position", "orientation") else ""

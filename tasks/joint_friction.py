@@ -60,7 +60,7 @@ class JointFriction(Load):
             if value is not None:
                 validation.real_array(f"JointFriction.{name}", value)
                 object.__setattr__(self, name, checked_limits(f"JointFriction.{name}", 0.0, value)[1])
-        object.__setattr__(self, "slow", validation.scalar("JointFriction.slow", self.slow, low=0.0, open_low=True))
+        validation.own_scalars(self, "slow", low=0.0, open_low=True)
 
     def validate(self, robot: Robot) -> None:
         count = len(self.dofs(robot))

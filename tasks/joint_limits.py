@@ -88,12 +88,10 @@ class JointLimits(Constraint):
     def __post_init__(self) -> None:
         for name in ("position", "velocity", "acceleration"):
             object.__setattr__(self, name, validation.flag(f"JointLimits.{name}", getattr(self, name)))
-        for name, unit in (("margin", "rad or m"), ("return_rate", "1/s")):
-            number = validation.scalar(f"JointLimits.{name}", getattr(self, name), low=0.0, unit=unit)
-            object.__setattr__(self, name, number)
+        validation.own_scalars(self, "margin", low=0.0, unit="rad or m")
+        validation.own_scalars(self, "return_rate", low=0.0, unit="1/s")
         if self.shortest_dt is not None:
-            number = validation.scalar("JointLimits.shortest_dt", self.shortest_dt, low=0.0, open_low=True, unit="s")
-            object.__setattr__(self, "shortest_dt", number)
+            validation.own_scalars(self, "shortest_dt", low=0.0, open_low=True, unit="s")
         if self.joints is not None:
             object.__setattr__(self, "joints", selection("JointLimits.joints", self.joints))
 

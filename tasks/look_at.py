@@ -74,8 +74,7 @@ class LookAt(Task):
         object.__setattr__(self, "axis", checked_axis("LookAt.axis", self.axis))
         object.__setattr__(self, "around", checked_around("LookAt.around", self.around, self.axis))
         object.__setattr__(self, "offset", triple(validation.real_array("LookAt.offset", self.offset, (3,))))
-        width = validation.scalar("LookAt.width", self.width, low=0.0, open_low=True, high=1.0)
-        object.__setattr__(self, "width", width)
+        validation.own_scalars(self, "width", low=0.0, open_low=True, high=1.0)
 
     def inputs(self, robot: Robot) -> tuple[Input, ...]:
         return (

@@ -102,8 +102,7 @@ class Manipulability(Task):
                 validation.one_of("Manipulability.along", label, LABELS)
             object.__setattr__(self, "along", tuple(sorted(labels, key=LABELS.index)))
         if self.length is not None:
-            length = validation.scalar("Manipulability.length", self.length, low=0.0, open_low=True, unit="m")
-            object.__setattr__(self, "length", length)
+            validation.own_scalars(self, "length", low=0.0, open_low=True, unit="m")
 
     def validate(self, robot: Robot) -> None:
         super().validate(robot)

@@ -97,7 +97,7 @@ class Obstacle(Constraint):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "shape", _checked_shape(self.shape))
-        object.__setattr__(self, "margin", validation.scalar("Obstacle.margin", self.margin, low=0.0, unit="m"))
+        validation.own_scalars(self, "margin", low=0.0, unit="m")
         object.__setattr__(self, "closest", bodies.checked_count("Obstacle.closest", self.closest))
         object.__setattr__(self, "corners", bodies.checked_count("Obstacle.corners", self.corners, least=0))
         if self.links is not None:

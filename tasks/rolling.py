@@ -48,11 +48,10 @@ class Wheel:
     def __post_init__(self) -> None:
         if not isinstance(self.joint, str):
             raise ShapeError("Wheel.joint", self.joint, "expected the name of a joint")
-        radius = validation.scalar("Wheel.radius", self.radius, low=0.0, open_low=True, unit="m")
-        object.__setattr__(self, "radius", radius)
+        validation.own_scalars(self, "radius", low=0.0, open_low=True, unit="m")
         if self.roller is not None:
             end = math.pi / 2 - _ALONG_AXIS
-            object.__setattr__(self, "roller", validation.scalar("Wheel.roller", self.roller, low=-end, high=end))
+            validation.own_scalars(self, "roller", low=-end, high=end)
 
 
 @dataclass(frozen=True)
@@ -123,7 +122,7 @@ class Rolling(Constraint):
         object.__setattr__(self, "wheels", wheels)
         if self.contact is not None:
             object.__setattr__(self, "contact", validation.flag("Rolling.contact", self.contact))
-        object.__setattr__(self, "gain", validation.scalar("Rolling.gain", self.gain, low=0.0, unit="1/s"))
+        validation.own_scalars(self, "gain", low=0.0, unit="1/s")
 
     def validate(self, robot: Robot) -> None:
         model = robot.model

@@ -105,7 +105,7 @@ class SelfCollision(Constraint):
     def __post_init__(self) -> None:
         if self.pairs is not None:
             object.__setattr__(self, "pairs", _checked_pairs(self.pairs))
-        object.__setattr__(self, "margin", validation.scalar("SelfCollision.margin", self.margin, low=0.0, unit="m"))
+        validation.own_scalars(self, "margin", low=0.0, unit="m")
         object.__setattr__(self, "closest", bodies.checked_count("SelfCollision.closest", self.closest))
         object.__setattr__(self, "corners", bodies.checked_count("SelfCollision.corners", self.corners, least=0))
         validation.one_of("SelfCollision.method", self.method, METHODS)

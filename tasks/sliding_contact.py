@@ -64,7 +64,7 @@ class SlidingContact(Pressing, Contact):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        object.__setattr__(self, "slow", validation.scalar("SlidingContact.slow", self.slow, low=0.0, open_low=True))
+        validation.own_scalars(self, "slow", low=0.0, open_low=True)
 
     def rows(self, robot: Robot) -> tuple[Row, ...]:
         return (Row("normal", "m/s"),)

@@ -32,8 +32,6 @@ from wbc.tick.generic import GenericTick
 #: As users have it; see tests/backends.py
 pytestmark = pytest.mark.at_once
 
-#: Seconds until a library is there, on a busy machine
-PATIENCE = 120.0
 FAMILY: dict[str, Callable[[], tuple[Stack, str]]] = {
     "small": lambda: (small.stack(), "velocity"),
     "panda": lambda: (everything("panda"), "velocity"),
@@ -54,7 +52,7 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
     gate, finish = threading.Event(), behind._finish
 
     def wait(child: subprocess.Popen[str]) -> str:
-        assert gate.wait(PATIENCE)
+        gate.wait()
         return finish(child)
 
     monkeypatch.setattr(behind, "_finish", wait)
@@ -62,11 +60,16 @@ def gate(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
     gate.set()
 
 
+def wait_for(library: behind.NativeBehind | None) -> None:
+    """Until it is there, for as long as somebody is at work on it: a busy machine takes any time."""
+    assert library is not None
+    while not library.ended.wait(0.1):
+        assert behind._work.threads, "nobody compiles any more"
+
+
 def changes(controller: Controller) -> bool:
     """Wait for the library; whether the next step will change over to it."""
-    found = controller._artifact.behind
-    assert found is not None
-    assert found.ended.wait(PATIENCE)
+    wait_for(controller._artifact.behind)
     assert controller.tier == "vm", "before a step"
     return core_of(controller).assembly.offered
 
@@ -148,12 +151,16 @@ def test_it_changes_under_threads_that_tick(gate: threading.Event) -> None:
             last = controller.tier == "native"
             wrong.extend([controller.tier] * (run(controller) != wanted))
 
+    # While they tick the library is loaded; what compiles it would hardly get a core beside them
+    assert behind._work.child is not None
+    while behind._work.child.poll() is None:
+        time.sleep(0.01)
     threads = [threading.Thread(target=work, args=(controller,)) for controller in crew]
     for thread in threads:
         thread.start()
     gate.set()
     for thread in threads:
-        thread.join(PATIENCE)
+        thread.join()
     assert wrong == []
     assert [c.tier for c in crew] == ["native"] * 3
 
@@ -174,16 +181,6 @@ def test_a_compiler_that_fails_leaves_them_as_they_are(
     assert controller.settled().tier == "vm"
 
 
-def test_what_it_says(gate: threading.Event, caplog: pytest.LogCaptureFixture) -> None:
-    with caplog.at_level(logging.INFO, "wbc"):
-        controller = small.stack().compile()
-        gate.set()
-        assert changes(controller)
-    assert [r.levelname for r in caplog.records if "change over with their next tick" in r.getMessage()] == ["INFO"]
-    with pytest.raises(ShapeError, match="wait"):
-        small.stack().compile(wait="no")  # type: ignore[arg-type]
-
-
 def test_a_loop_may_forbid_the_change(gate: threading.Event) -> None:
     controller = small.stack().compile()
     controller.may_change = False
@@ -201,11 +198,15 @@ def test_a_loop_may_forbid_the_change(gate: threading.Event) -> None:
         controller.may_change = "no"  # type: ignore[assignment]
 
 
-def test_who_waits_has_native_code(gate: threading.Event) -> None:
-    first = small.stack().compile()
-    gate.set()
-    assert small.stack().compile(wait=True).tier == "native"
-    assert first.settled().tier == "native"
+def test_who_waits_has_native_code(gate: threading.Event, caplog: pytest.LogCaptureFixture) -> None:
+    with caplog.at_level(logging.INFO, "wbc"):
+        first = small.stack().compile()
+        gate.set()
+        assert small.stack().compile(wait=True).tier == "native"
+        assert first.settled().tier == "native"
+    assert [r.levelname for r in caplog.records if "change over with their next tick" in r.getMessage()] == ["INFO"]
+    with pytest.raises(ShapeError, match="wait"):
+        small.stack().compile(wait="no")  # type: ignore[arg-type]
     assert first.batch(2).step(small.Q).v[1].tobytes() == first.clone().step(small.Q).v.tobytes()
 
 
@@ -218,8 +219,7 @@ def test_the_compiler_has_a_low_priority_within_the_session_of_its_loop(gate: th
     assert os.getpgid(child.pid) == child.pid
     assert os.getpriority(os.PRIO_PROCESS, child.pid) >= behind._LOW
     gate.set()
-    assert controller._artifact.behind is not None
-    assert controller._artifact.behind.ended.wait(PATIENCE)
+    wait_for(controller._artifact.behind)
 
 
 def test_a_loop_in_real_time_waits_for_it_no_longer_than_a_turn(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -333,10 +333,12 @@ def test_what_nobody_has_any_more_is_not_compiled(gate: threading.Event, tmp_pat
     gc.collect()
     gate.set()
     assert changes(first)
-    assert library.ended.wait(PATIENCE)
+    wait_for(library)
     assert library.library(wait=False) is None
 
 
+#: Seconds that no process of these tests lives, however busy the machine is
+LONGER = 600.0
 #: A compiler that takes its time over rows, and says that it is at work
 SLOW = """#!/bin/sh
 case "$*" in *rows.c*) touch "$WBC_AT_WORK"; sleep {seconds};; esac
@@ -358,16 +360,16 @@ while not os.path.exists(os.environ["WBC_AT_WORK"]):
     time.sleep(0.01)
 try:
     os.killpg(0, signal.SIGINT)
-    time.sleep(60)
+    time.sleep(600)
 except KeyboardInterrupt:
-    controller._artifact.behind.ended.wait(60)
+    controller._artifact.behind.ended.wait()
 controller.step(small.Q)
 print(controller.tier, controller.step(small.Q).v.size)
 """
 
 
-def run(script: str, folder: pathlib.Path, seconds: float) -> tuple[str, float, list[str]]:
-    """What a process says, how long it lives after its compiler began, and what is left in its cache."""
+def run(script: str, folder: pathlib.Path, seconds: float) -> tuple[str, list[str]]:
+    """What a process says that does not live as long as LONGER, and what is left in its cache."""
     compiler = toolchain.compiler()
     cc, kept, work = folder / "cc", folder / "cache", folder / "work"
     cc.write_text(SLOW.format(gcc=compiler, seconds=seconds))
@@ -380,19 +382,14 @@ def run(script: str, folder: pathlib.Path, seconds: float) -> tuple[str, float, 
         text=True,
         start_new_session=True,
     )
-    until = time.monotonic() + PATIENCE
-    while not work.exists() and process.poll() is None and time.monotonic() < until:
-        time.sleep(0.01)
-    began = time.monotonic()
-    said, errors = process.communicate(timeout=PATIENCE)
+    said, errors = process.communicate(timeout=LONGER)
     assert process.returncode == 0, errors
-    return said.strip(), time.monotonic() - began, [p.name for p in kept.iterdir() if p.is_dir() and p.name[0] == "."]
+    return said.strip(), [p.name for p in kept.iterdir() if p.is_dir() and p.name[0] == "."]
 
 
 def test_the_end_of_the_process_ends_the_compiler(tmp_path: pathlib.Path) -> None:
-    said, lived, left = run(ENDS, tmp_path, 30.0)
+    said, left = run(ENDS, tmp_path, 2.0 * LONGER)
     assert said == "vm 2"
-    assert lived < 20.0
     assert left == [], "nothing half made in the cache"
     assert not any(str(tmp_path / "cc").encode() in _command_line(p) for p in pathlib.Path("/proc").glob("[0-9]*"))
 
@@ -405,6 +402,6 @@ def _command_line(process: pathlib.Path) -> bytes:
 
 
 def test_an_interrupt_does_not_end_the_compiler(tmp_path: pathlib.Path) -> None:
-    said, _, left = run(INTERRUPTED, tmp_path, 0.3)
+    said, left = run(INTERRUPTED, tmp_path, 0.3)
     assert said == "native 2"
     assert left == []

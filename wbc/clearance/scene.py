@@ -26,8 +26,7 @@ class _Endless(Geometry):
     radius: float
 
     def __post_init__(self) -> None:
-        name = f"{type(self).__name__}.radius"
-        object.__setattr__(self, "radius", validation.scalar(name, self.radius, low=0.0, open_low=True, unit="m"))
+        validation.own_scalars(self, "radius", low=0.0, open_low=True, unit="m")
 
     @property
     def sizes(self) -> tuple[float, float, float, float, float]:

@@ -74,9 +74,7 @@ class Clearances:
     def __post_init__(self) -> None:
         if not self.climber.robot.shapes:
             raise ShapeError("robot.shapes", None, "the robot has no shapes, so nothing can be proven to be clear")
-        for name in ("clearance", "apart"):
-            value = validation.scalar(f"Clearances.{name}", getattr(self, name), low=0.0, unit="m")
-            object.__setattr__(self, name, value)
+        validation.own_scalars(self, "clearance", "apart", low=0.0, unit="m")
 
     def __getstate__(self) -> dict[str, object]:
         return pickling.declared(self)

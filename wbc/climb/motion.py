@@ -103,16 +103,11 @@ class MotionOptions:
     effort: float = np.inf
 
     def __post_init__(self) -> None:
-        for name in ("clearance", "apart", "lift"):
-            value = validation.scalar(f"MotionOptions.{name}", getattr(self, name), low=0.0, unit="m")
-            object.__setattr__(self, name, value)
-        margin = validation.scalar("MotionOptions.margin", self.margin, low=0.0, high=1.0)
-        object.__setattr__(self, "margin", margin)
+        validation.own_scalars(self, "clearance", "apart", "lift", low=0.0, unit="m")
+        validation.own_scalars(self, "margin", low=0.0, high=1.0)
         if not self.effort > 0.0:
             raise RangeError("MotionOptions.effort", self.effort, "expected a share above 0")
-        for name in ("inertia", "friction"):
-            share = validation.scalar(f"MotionOptions.{name}", getattr(self, name), low=0.0, high=1.0, open_low=True)
-            object.__setattr__(self, name, share)
+        validation.own_scalars(self, "inertia", "friction", low=0.0, high=1.0, open_low=True)
         validation.instance("MotionOptions.speeds", self.speeds, MotionSpeeds, "MotionSpeeds")
 
 

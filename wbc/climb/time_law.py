@@ -51,16 +51,9 @@ class MotionSpeeds:
     dwell: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("speed", "turn_rate"):
-            if getattr(self, name) != np.inf:
-                value = validation.scalar(f"MotionSpeeds.{name}", getattr(self, name), low=0.0, open_low=True)
-                object.__setattr__(self, name, value)
-        for name in ("share", "acceleration_share"):
-            field = f"MotionSpeeds.{name}"
-            object.__setattr__(
-                self, name, validation.scalar(field, getattr(self, name), low=0.0, high=1.0, open_low=True)
-            )
-        object.__setattr__(self, "dwell", validation.scalar("MotionSpeeds.dwell", self.dwell, low=0.0, unit="s"))
+        validation.own_scalars(self, "speed", "turn_rate", low=0.0, open_low=True, infinite=True)
+        validation.own_scalars(self, "share", "acceleration_share", low=0.0, high=1.0, open_low=True)
+        validation.own_scalars(self, "dwell", low=0.0, unit="s")
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,9 +28,7 @@ class Cylinder(Solid):
     geom = "CYLINDER"
 
     def __post_init__(self) -> None:
-        for name in ("radius", "length"):
-            number = validation.scalar(f"Cylinder.{name}", getattr(self, name), low=0.0, open_low=True, unit="m")
-            object.__setattr__(self, name, number)
+        validation.own_scalars(self, "radius", "length", low=0.0, open_low=True, unit="m")
 
     @property
     def reach(self) -> float:

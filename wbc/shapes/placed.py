@@ -40,7 +40,7 @@ class PlacedShape:
         if not isinstance(self.shape, Shape):
             raise _no_shape(self.shape)
         object.__setattr__(self, "placement", validation.own_pose("PlacedShape.placement", self.place))
-        object.__setattr__(self, "excess", validation.scalar("PlacedShape.excess", self.excess, low=0.0, unit="m"))
+        validation.own_scalars(self, "excess", low=0.0, unit="m")
 
     def __getstate__(self) -> dict[str, object]:
         return pickling.declared(self)

@@ -25,7 +25,7 @@ class Sphere(Solid):
     geom = "SPHERE"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", validation.scalar("Sphere.radius", self.radius, low=0.0, unit="m"))
+        validation.own_scalars(self, "radius", low=0.0, unit="m")
 
     @property
     def reach(self) -> float:
@@ -53,8 +53,7 @@ class Capsule(Solid):
     geom = "CAPSULE"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", validation.scalar("Capsule.radius", self.radius, low=0.0, unit="m"))
-        object.__setattr__(self, "length", validation.scalar("Capsule.length", self.length, low=0.0, unit="m"))
+        validation.own_scalars(self, "radius", "length", low=0.0, unit="m")
 
     @property
     def reach(self) -> float:

@@ -56,10 +56,8 @@ class Ground:
                  for name, radius in points.items()}  # fmt: skip
         object.__setattr__(self, "points", radii)
         validation.function("Ground.distance", self.distance)
-        for name in ("stiffness", "damping", "friction"):
-            low = name == "stiffness"
-            number = validation.scalar(f"Ground.{name}", getattr(self, name), low=0.0, open_low=low)
-            object.__setattr__(self, name, number)
+        validation.own_scalars(self, "stiffness", low=0.0, open_low=True)
+        validation.own_scalars(self, "damping", "friction", low=0.0)
 
 
 class Touch:

@@ -155,9 +155,7 @@ class Encoders:
     resolution: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("position", "velocity", "resolution"):
-            number = validation.scalar(f"Encoders.{name}", getattr(self, name), low=0.0)
-            object.__setattr__(self, name, number)
+        validation.own_scalars(self, "position", "velocity", "resolution", low=0.0)
 
     @property
     def exact(self) -> bool:

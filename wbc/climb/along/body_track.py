@@ -50,9 +50,7 @@ class BodyTrack:
         if len(given) < 2:
             raise ShapeError("BodyTrack.poses", len(given), "expected two poses or more")
         object.__setattr__(self, "poses", tuple(validation.pose("BodyTrack.poses", pose) for pose in given))
-        for name in ("speed", "turn_rate"):
-            value = validation.scalar(f"BodyTrack.{name}", getattr(self, name), low=0.0, open_low=True)
-            object.__setattr__(self, name, value)
+        validation.own_scalars(self, "speed", "turn_rate", low=0.0, open_low=True)
         if not self.duration > 0.0:
             raise RangeError("BodyTrack.poses", 0.0, "the way has no length")
         if self.duration > MOST * INSTANT:

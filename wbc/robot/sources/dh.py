@@ -54,8 +54,7 @@ class DHRow:
     name: str = ""
 
     def __post_init__(self) -> None:
-        for key in ("a", "alpha", "d", "theta"):
-            object.__setattr__(self, key, validation.scalar(f"DHRow.{key}", getattr(self, key)))
+        validation.own_scalars(self, "a", "alpha", "d", "theta")
         if not isinstance(self.name, str) or self.name:
             validation.name("DHRow.name", self.name)
         validation.one_of("DHRow.joint", self.joint, JOINTS)
