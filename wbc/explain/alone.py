@@ -97,12 +97,12 @@ class Alone:
         self._tick.p[block.slots["gain"].span], self._tick.plain[0] = 1.0, 1.0
         self._scales = layout.row_scales(past.stack)[block.span]
         self._dofs = layout.dof_scales(past.stack)[: layout.nv]
-        places, lower, upper = stops(past.stack, layout)
-        at = np.array(places[: layout.nv])
+        ends = stops(past.stack, layout)
+        at = np.array(ends.bounds[: layout.nv])
         on = at >= 0
         on[on] = self._tick.bound_enabled[at[on]] != 0.0
-        self.lower = np.where(on, lower[: layout.nv], -np.inf)
-        self.upper = np.where(on, upper[: layout.nv], np.inf)
+        self.lower = np.where(on, ends.lower[: layout.nv], -np.inf)
+        self.upper = np.where(on, ends.upper[: layout.nv], np.inf)
         self._own = np.zeros(layout.general_rows, dtype=bool)
         for each in layout.of_form("rows"):
             self._own[each.span] = isinstance(each.entry.item, Mechanism)

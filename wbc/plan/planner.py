@@ -153,7 +153,7 @@ class MotionPlanner(Handles):
         self._core = core_of(self._controller)
         super().__init__(self._core.handles, light)
         self._idle = frozenset(names) - set(self.kept)
-        self._stops = stops(declared, self._core.layout)[1:]
+        self._stops = stops(declared, self._core.layout)
         self._places = PlanningScene.places_of(self._core)
         self._scene: PlanningScene | None = None
         self._use(PlanningCoordinates.of(declared.robot, declared.length))
@@ -211,7 +211,7 @@ class MotionPlanner(Handles):
         self.coordinates = coordinates
         #: of wheels that follow a base
         self._wheels = [k for k, scale in enumerate(coordinates.scale) if np.isinf(scale)]
-        self._limits = coordinates.limits(*self._stops)
+        self._limits = coordinates.limits(self._stops.lower, self._stops.upper)
         self._builder = RowsBuilder(self._core, coordinates, self.kept)
         self._rows: dict[tuple[bytes, tuple[str, ...]], PlanningRows] = {}
         self._native: NativePlanner | None = None
