@@ -154,19 +154,14 @@ static void contact_rows(const limb_t *l, const placed_t *p, const double *wante
 
 /* Solves H x = g, n x n and positive, in place by H = L L'; 0: it is not positive */
 static int solve_positive(int n, double *H, double *g) {
-    for (int i = 0; i < n; i++) {
-        for (int k = 0; k <= i; k++) {
-            double sum = H[i * n + k];
-            for (int j = 0; j < k; j++) sum -= H[i * n + j] * H[k * n + j];
-            if (i == k) {
-                if (!(sum > 0.0)) return 0;
-                H[i * n + i] = sqrt(sum);
-            } else {
-                H[i * n + k] = sum / H[k * n + k];
-            }
-        }
-        for (int j = 0; j < i; j++) g[i] -= H[i * n + j] * g[j];
-        g[i] /= H[i * n + i];
+    double column[n];
+    for (int k = 0; k < n; k++) {
+        if (!(H[k * (n + 1)] > 0.0)) return 0;
+        const double root = sqrt(H[k * (n + 1)]);
+        H[k * (n + 1)] = root, g[k] /= root;
+        for (int i = k + 1; i < n; i++) column[i] = H[i * n + k] /= root, g[i] -= column[i] * g[k];
+        for (int i = k + 1; i < n; i++)
+            for (int j = k + 1; j <= i; j++) H[i * n + j] -= column[i] * column[j];
     }
     for (int i = n - 1; i >= 0; i--) {
         for (int j = i + 1; j < n; j++) g[i] -= H[j * n + i] * g[j];
