@@ -96,11 +96,6 @@ def _admittances(
     return det / v, (rows[0], rows[1])
 
 
-def _non_negative(of: object, kind: str, names: tuple[str, ...]) -> None:
-    for name in names:
-        validation.scalar(f"{kind}.{name}", getattr(of, name), low=0.0)
-
-
 @dataclass(frozen=True)
 class Device:
     """What an arm feels like: m du/dt + d u = outer force + force of the teleoperator, in each coordinate.
@@ -117,8 +112,8 @@ class Device:
     most_damped: float = 50.0
 
     def __post_init__(self) -> None:
-        _non_negative(self, "Device", ("damping", "stiffest", "most_damped"))
-        validation.scalar("Device.mass", self.mass, low=0.0, open_low=True, unit="kg")
+        validation.own_scalars(self, "damping", "stiffest", "most_damped", low=0.0)
+        validation.own_scalars(self, "mass", low=0.0, open_low=True, unit="kg")
 
     def check(self, side: str, dt: float) -> None:
         """Raises:
@@ -144,8 +139,8 @@ class Channels:
     local_force: float = 0.0
 
     def __post_init__(self) -> None:
-        _non_negative(self, "Channels", ("stiffness", "damping", "remote_force"))
-        validation.scalar("Channels.local_force", self.local_force, low=0.0, high=1.0)
+        validation.own_scalars(self, "stiffness", "damping", "remote_force", low=0.0)
+        validation.own_scalars(self, "local_force", low=0.0, high=1.0)
 
 
 @dataclass(frozen=True)
@@ -192,9 +187,9 @@ class Channel:
     loss: float = 0.0
 
     def __post_init__(self) -> None:
-        for name in ("delay", "jitter"):
-            validation.scalar(f"Channel.{name}", getattr(self, name), low=0.0, high=LONGEST, unit="s")
-        if validation.scalar("Channel.loss", self.loss, low=0.0, high=1.0) == 1.0:
+        validation.own_scalars(self, "delay", "jitter", low=0.0, high=LONGEST, unit="s")
+        validation.own_scalars(self, "loss", low=0.0, high=1.0)
+        if self.loss == 1.0:
             raise RangeError("Channel.loss", self.loss, "expected less than 1: nothing would arrive")
 
     def newest(self, ticks: int, dt: float, generator: np.random.Generator) -> Array:
