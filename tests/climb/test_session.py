@@ -103,6 +103,10 @@ def test_a_plan_of_another_robot_or_scene_is_refused_by_name(
     np.savez(other, times=np.zeros(3))
     with pytest.raises(PlanFileError, match="no contact plan"):
         read_record(other)
+    other.write_bytes(bytes(range(256)))
+    with pytest.raises(PlanFileError, match="no log of this package: File is not a zip file") as refused:
+        read_record(other)
+    assert str(refused.value).count("(got ") == 1
     with pytest.raises(PlanFileError, match="no such file"):
         read_record(tmp_path / "none.npz")
 

@@ -120,8 +120,9 @@ def test_logs_that_cannot_be_read(tmp_path: Path) -> None:
         track.load(tmp_path / "none")
     for name in ("log.parquet", "log.npz"):
         (tmp_path / name).write_text("nonsense")
-        with pytest.raises(LogFileError, match="no log of this package"):
+        with pytest.raises(LogFileError, match="no log of this package") as refused:
             track.load(tmp_path / name)
+        assert "unsafe" not in refused.value.reason
     with pytest.raises(UnknownNameError, match="did you mean 'parquet'"):
         track.save(demo(), tmp_path, "parqet")
 

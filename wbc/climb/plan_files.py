@@ -102,7 +102,9 @@ def read_record(path: str | os.PathLike[str]) -> Log:
         ):
             raise ValueError("rows of footholds that are not there")
         return record
-    except (LogFileError, KeyError, ValueError, TypeError, IndexError) as error:
+    except LogFileError as error:
+        raise PlanFileError("plan", str(file), f"no contact plan: {error.reason}") from error
+    except (KeyError, ValueError, TypeError, IndexError) as error:
         raise PlanFileError("plan", str(file), f"no contact plan: {error}") from error
 
 

@@ -150,7 +150,8 @@ def log_of(file: LogFile, rows: Array) -> Log:
 
 
 def _read_npz(path: pathlib.Path) -> Log:
-    with np.load(path, allow_pickle=False) as data:
+    # NumPy takes what is no archive for a pickle, and advises to load it unsafely
+    with zipfile.ZipFile(path), np.load(path, allow_pickle=False) as data:
         if "about.json" in data.files:
             return _read_part(LogFile(path))
         read = {name: data[name] for name in data.files}
