@@ -29,8 +29,8 @@ Fault = Callable[[Columns, Climber], None]
 ALOFT, LONGER, KNEE = slice(50, 51), slice(47, 53), "q.8"
 #: What the checker may take from the package: what a log, a robot, a scene and shapes are
 SHARED = {
-    "wbc.climb.climber", "wbc.climb.scene", "wbc.clearance", "wbc.errors", "wbc.lazy", "wbc.log", "wbc.multibody",
-    "wbc.shapes", "wbc.validation",
+    "wbc.climb.climber", "wbc.climb.scene", "wbc.clearance", "wbc.errors", "wbc.lazy", "wbc.linear_program",
+    "wbc.log", "wbc.multibody", "wbc.shapes", "wbc.validation",
 }  # fmt: skip
 
 

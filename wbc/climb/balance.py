@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 from scipy.linalg import block_diag
-from scipy.optimize import linprog
 
 from wbc import validation
 from wbc.climb.climber import Climber
@@ -15,6 +14,7 @@ from wbc.climb.scene import ClimbScene
 from wbc.climb.stance import FREE_LIMB
 from wbc.climb.world import ClimbWorld, held_pose
 from wbc.errors import RangeError, ShapeError
+from wbc.linear_program import least
 from wbc.multibody import pin
 from wbc.symbolic.joint_steps import place
 from wbc.symbolic.kinematics import frame_index
@@ -92,7 +92,7 @@ class Equilibrium:
         rows, count = np.hstack([A, -np.diag(sizes), np.zeros((len(A), 12))]), G.shape[1]
         cost = np.concatenate([np.zeros(count), np.ones(len(A)), np.full(12, UNBALANCED)])
         free = [(None, None)] * count + [(0.0, None)] * (len(A) + 12)
-        answer = linprog(cost, rows, b, np.hstack([G, np.zeros((6, len(A))), base]), r, free, method="highs")
+        answer = least(cost, rows, b, np.hstack([G, np.zeros((6, len(A))), base]), r, free)
         over = answer.x[count : count + len(A)] * sizes
         names = [self.climber.robot.dof_names[dof] for dof in motors]
         both = np.maximum(over[cones : cones + len(motors)], over[cones + len(motors) :]) * weight

@@ -429,7 +429,7 @@ class Explorer:
 
     def _ranges(self, space: SolutionSpace, q: Array, dt: float) -> tuple[Array, Array]:
         """Least and largest rate of each joint: two linear programs a joint."""
-        from scipy.optimize import linprog
+        from wbc.linear_program import OPTIMAL, UNBOUNDED, least
 
         limits, D = self.robot.limits, space.directions
         low, high = -limits.velocity, limits.velocity.copy()
@@ -446,9 +446,9 @@ class Explorer:
         A, b = A[np.isfinite(b)], b[np.isfinite(b)]
         for k, side in product(range(nv), range(2)):
             sign = 1.0 - 2.0 * side
-            found = linprog(sign * D.T[k], A if len(A) else None, b if len(A) else None, bounds=(None, None))
-            if found.status == 0:
+            found = least(sign * D.T[k], A if len(A) else None, b if len(A) else None)
+            if found.status == OPTIMAL:
                 out[side, k] = g[k] + sign * found.fun
-            elif found.status == 3:
+            elif found.status == UNBOUNDED:
                 out[side, k] = -sign * np.inf
         return out[0], out[1]

@@ -24,12 +24,12 @@ from typing import Any, NoReturn
 
 import numpy as np
 from scipy.linalg import null_space, orth
-from scipy.optimize import linprog
 from scipy.sparse.csgraph import connected_components
 
 from wbc import validation
 from wbc.controller.compiled_stack import CompiledStack
 from wbc.errors import CommandError, RangeError
+from wbc.linear_program import least
 from wbc.multibody import mass_matrix, pin
 from wbc.robot import Robot
 from wbc.support.statics import Statics, TorqueRows, least_lack
@@ -287,14 +287,13 @@ class _WithContacts:
         cost[-1] = -1.0
         most = np.full(wide.shape[1], np.inf)
         most[self._base : count] = (limit / found.scale[:count])[self._base :]
-        answer = linprog(
+        answer = least(
             cost,
             np.column_stack([above, last]),
             np.concatenate(ends),
             np.column_stack([wide[equal], np.zeros(equal.sum())]),
             low[equal],
             np.column_stack([np.append(-most, -np.inf), np.append(most, 1.0)]),
-            method="highs",
         )
         if answer.x is None or answer.x[-1] <= 0.0:
             self._refuse(found, q, v, signs)

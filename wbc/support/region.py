@@ -18,11 +18,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.optimize import linprog
 
 from wbc import validation
 from wbc.controller.compiled_stack import CompiledStack, core_of
 from wbc.errors import CommandError, RangeError
+from wbc.linear_program import OPTIMAL, least
 from wbc.multibody import pin
 from wbc.support.statics import Statics, statics
 from wbc.validation import Array
@@ -169,8 +169,8 @@ class _RegionProgram:
         cost = np.zeros(len(self._bounds))
         cost[-2:] = -direction
         (A, b), (E, e) = self._sides, self._equal
-        answer = linprog(cost, A_ub=A, b_ub=b, A_eq=E, b_eq=e, bounds=self._bounds, method="highs")
-        return None if answer.status != 0 else np.array(answer.x[-2:])
+        answer = least(cost, A, b, E, e, self._bounds)
+        return None if answer.status != OPTIMAL else np.array(answer.x[-2:])
 
 
 def projected(farthest: Callable[[Array], Array | None], tolerance: float) -> tuple[Array, Array]:

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from wbc.controller.compiled_stack import CompiledStack, core_of
 from wbc.errors import CommandError, SolverError
+from wbc.linear_program import least
 from wbc.stack.layout import Slot
 from wbc.tasks._contact import ContactWrench, Unactuated
 from wbc.tasks.base import Constraint
@@ -189,9 +189,7 @@ def least_lack(found: Statics, q: Any) -> tuple[Lacking, ...]:
         sides.append(np.hstack([sign * wide, -np.eye(rows)])[on])
         limits.append((end / found.sizes)[on])
     bounds = [(None, None)] * count + [(0.0, None)] * rows
-    answer = linprog(price, A_ub=np.vstack(sides), b_ub=np.concatenate(limits), bounds=bounds, method="highs")
-    if answer.x is None:
-        raise SolverError("q", q, f"no answer from the linear program: {answer.message}")
+    answer = least(price, np.vstack(sides), np.concatenate(limits), bounds=bounds)
     short = answer.x[count:]
     order = np.argsort(-short)
     named = ((found.names[k], short[k] * found.sizes[k]) for k in order if short[k] > COUNTS)

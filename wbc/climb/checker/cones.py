@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from wbc.climb.checker.record import OPEN, Climbed
 from wbc.climb.checker.report import CheckRules, RuleTally
+from wbc.linear_program import OPTIMAL, least
 from wbc.multibody import pin
 from wbc.validation import Array
 
@@ -86,11 +86,11 @@ def _margin(climbed: Climbed, k: int, mass: float, gravity: Array) -> float:
         limits.append(b / weight)
     if not closed:
         return -np.inf
-    found = linprog(
+    found = least(
         np.append(np.zeros(6 * len(closed)), -1.0), np.vstack(rows), np.concatenate(limits),
-        np.hstack([*balance, np.zeros((6, 1))]), wanted, bounds=[(None, None)] * (6 * len(closed)) + [(None, ENOUGH)],
+        np.hstack([*balance, np.zeros((6, 1))]), wanted, [(None, None)] * (6 * len(closed)) + [(None, ENOUGH)],
     )  # fmt: skip
-    return float(found.x[-1]) if found.status == 0 else -np.inf
+    return float(found.x[-1]) if found.status == OPTIMAL else -np.inf
 
 
 def _fixing(climbed: Climbed, k: int) -> float:
