@@ -17,6 +17,7 @@ from wbc.climb import (
     ClimbLoop,
     ClimbOptions,
     ContactPlan,
+    Equilibrium,
     MotionOptions,
     NoStancesError,
     StanceOptions,
@@ -26,6 +27,7 @@ from wbc.climb import (
 )
 from wbc.climb.along import AlongOptions, BodyTrack, plan_along
 from wbc.climb.motion import MoveError
+from wbc.climb.path_loads import LEAST
 from wbc.climb.places import body_over
 from wbc.climb.scene import size_of
 from wbc.climb.scenes import ClimbCourse, draw, placed
@@ -133,3 +135,14 @@ def test_what_stands_in_the_way_is_missed(family: str) -> None:
             walked += 1
         seed += 1
     assert walked > 0
+
+
+def test_equilibrium_holds_between_the_points_at_which_it_was_looked_at() -> None:
+    """One of these moves is so near to where its grip gives way that four of its fifteen seconds lie between two."""
+    climber = machines.climber("truss_climber")
+    course = draw("rubble", size_of(climber))
+    start = first_stance(climber, course.scene, placed(climber, course.start))
+    goal = BodyPlace(climber.body_pose(placed(climber, course.goal)).translation)
+    plan, balance = plan_climb(climber, course.scene, start, goal), Equilibrium(climber, course.scene)
+    least = [balance.margin(plan.contacts_at(t), q) for t, q in zip(plan.times[::7], plan.q[::7], strict=True)]
+    assert min(least) >= 0.9 * min(plan.margin, LEAST)

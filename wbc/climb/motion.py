@@ -43,6 +43,8 @@ ASIDES = (1.0, 2.0)
 INSTANTS = 12
 #: Of the margin asked for, the share that is kept where all limbs hold and the body shifts [1]
 SHIFTED = 0.5
+#: How often a grid of a path is made finer where equilibrium between its points may be less than is needed
+REFINED = 5
 #: Into how many parts intervals of a path are divided for its proof, one after the other, while that stays open
 PARTS = (1, 2, 4)
 
@@ -269,9 +271,13 @@ class Mover:
         picked = np.unique(np.linspace(0, len(path.q) - 1, INSTANTS).astype(int))
         if np.any(self.scene.gravity):
             # Second derivatives of a path are largest at its samples
-            where = np.unique(np.concatenate([GRID, path.s]).round(9))
-            loads = PathLoads(self.balance, path, held, where, self.options.inertia)
-            margins, needed = loads.at_rest, self._needed(one, other)
+            where, needed = np.unique(np.concatenate([GRID, path.s]).round(9)), self._needed(one, other)
+            for _ in range(REFINED):
+                loads = PathLoads(self.balance, path, held, where, self.options.inertia)
+                margins = loads.at_rest
+                if margins.min() < needed or not len(more := _dips(where, margins, needed)):
+                    break
+                where = np.sort(np.append(where, more))
         else:
             where, margins = path.s[picked], np.array([self.balance.margin(held, q) for q in path.q[picked]])
         least, part, what = float(margins.min()), 100.0 * where[int(np.argmin(margins))], "contacts that hold"
@@ -284,6 +290,15 @@ class Mover:
             text = f"the {what} do not bear the robot at {part:.0f} % of the way: they lack"
             return _refused(row, least, f"{text} {needed - least:.3g} of its weight", None), least, loads
         return None, least, loads
+
+
+def _dips(s: Array, slacks: Array, needed: float) -> Array:
+    """Middles of intervals in which a slack, of the curvature that it has at its ends, may be less than is needed."""
+    h, rates = np.diff(s), np.diff(slacks) / np.diff(s)
+    bends = np.abs(np.diff(rates)) / (0.5 * (h[:-1] + h[1:]))
+    bend = np.maximum(np.append(bends[0], bends), np.append(bends, bends[-1]))
+    lowest = np.minimum(slacks[:-1], slacks[1:]) - bend * h**2 / 8.0
+    return np.asarray((0.5 * (s[:-1] + s[1:]))[lowest < needed])
 
 
 def carry_out(
