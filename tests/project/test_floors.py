@@ -12,9 +12,9 @@ import pytest
 from tests.project.layout import ROOT, module_name, nodes, relative, sources
 
 #: Parts of the package, floor by floor from the ground up. Solvers know nothing of robots: see ONLY.
-GROUND = "cores errors extras interrupts lazy multibody pickling quick_dataclasses rotations shapes style"
+GROUND = "archives cores errors extras interrupts lazy multibody pickling quick_dataclasses rotations shapes style"
 LEVELS = (
-    f"{GROUND} terminal validation",
+    f"{GROUND} linear_program terminal validation",
     "estimation geometry log native symbolic",
     "proximity resolvers robot robots",
     "clearance simulation tasks",

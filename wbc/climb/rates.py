@@ -11,6 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from wbc import validation
+from wbc.archives import open_npz
 from wbc.clearance import CylinderInside, EndlessCylinder
 from wbc.climb.scene import ClimbScene
 from wbc.errors import RangeError, ShapeError
@@ -132,7 +133,7 @@ def round_surface(scene: ClimbScene, pose: pin.SE3, twist: Array) -> Array:
 
 
 def _from_npz(file: Path) -> list[tuple[str, Array]]:
-    with np.load(file, allow_pickle=False) as data:
+    with open_npz(file) as data:
         names = [*LINEAR, *(ANGULAR if set(ANGULAR) & set(data.files) else ())]
         for name in names:
             validation.one_of("rates", name, data.files)

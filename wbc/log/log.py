@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from wbc import extras, validation
+from wbc.archives import open_npz
 from wbc.errors import RangeError
 from wbc.log.file import LogFile, LogFileError
 from wbc.validation import Array
@@ -150,8 +151,7 @@ def log_of(file: LogFile, rows: Array) -> Log:
 
 
 def _read_npz(path: pathlib.Path) -> Log:
-    # NumPy takes what is no archive for a pickle, and advises to load it unsafely
-    with zipfile.ZipFile(path), np.load(path, allow_pickle=False) as data:
+    with open_npz(path) as data:
         if "about.json" in data.files:
             return _read_part(LogFile(path))
         read = {name: data[name] for name in data.files}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from wbc import validation
+from wbc.archives import open_npz
 from wbc.errors import RotationError, ShapeError, UnknownNameError
 from wbc.multibody import pin
 from wbc.track.path_file import csv_rows, rows_of
@@ -63,7 +63,7 @@ def as_target(label: str, given: Any) -> Target:
 
 
 def _from_npz(file: Path) -> list[tuple[str, Any]]:
-    with zipfile.ZipFile(file), np.load(file, allow_pickle=False) as arrays:
+    with open_npz(file) as arrays:
         names = list(arrays.files)
         for name in names:
             if name not in ARRAYS:

@@ -16,6 +16,7 @@ import numpy as np
 from wbc import validation
 from wbc.analysis.algebra.trig_form import TrigForm
 from wbc.analysis.certificates.boxes import BoxSearch, Counts
+from wbc.archives import open_npz
 from wbc.errors import RobotFileError
 from wbc.interrupts import interrupts
 from wbc.validation import Array
@@ -134,7 +135,7 @@ class BoxPieces:
 
     def _load(self, path: Path) -> None:
         try:
-            with np.load(path, allow_pickle=False) as data:
+            with open_npz(path) as data:
                 name, boxes, kept = str(data["name"]), data["boxes"], data["kept"]
                 counts, seconds = Counts(*map(float, data["counts"])), float(data["seconds"])
         except (OSError, ValueError, KeyError, BadZipFile) as error:

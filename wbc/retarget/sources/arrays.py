@@ -10,6 +10,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from wbc.archives import open_npz
 from wbc.retarget.sources.recorded import no_clip
 
 #: What a pickle of arrays may ask for: names by module, which is called otherwise in other versions
@@ -73,7 +74,7 @@ def load(path: pathlib.Path) -> Any:
         if kind == ".npy":
             return np.load(path, allow_pickle=False)
         if kind == ".npz":
-            with np.load(path, allow_pickle=False) as data:
+            with open_npz(path) as data:
                 return {name: values for name in data.files if (values := _plain(data, name)) is not None}
         if kind == ".pt":
             with zipfile.ZipFile(path) as archive:
