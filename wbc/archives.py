@@ -6,13 +6,13 @@ import os
 import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 
 
 @contextmanager
-def open_npz(file: str | os.PathLike[str] | IO[bytes]) -> Iterator[Any]:
+def open_npz(file: str | os.PathLike[str]) -> Iterator[Any]:
     """The arrays of a file by name, none of which is a pickle, while it is open.
 
     NumPy takes what is no archive for a pickle, and advises to load it unsafely; here it is no zip file.
