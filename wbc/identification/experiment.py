@@ -13,12 +13,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.linalg import expm
 
 from wbc import validation
 from wbc.errors import RangeError
 from wbc.identification.exciting import ExcitingMotion, exciting_motion
 from wbc.identification.fit import Identified, identify
-from wbc.identification.pseudo_inertia import from_log_cholesky, is_body, log_cholesky, model_parameters
+from wbc.identification.pseudo_inertia import is_body, model_parameters, parameters, pseudo_inertia
 from wbc.identification.regression import SLOW, Regression, Samples
 from wbc.multibody import pin
 from wbc.robot import Robot
@@ -83,15 +84,15 @@ class Experiment:
 
 
 def changed(robot: Robot, far: float = FAR, seed: int = 0) -> Robot:
-    """A robot whose bodies are others: log-Cholesky coordinates that are moved at random, each body still a body."""
+    """A robot whose bodies are others: pseudo-inertias U U' become U exp(S) U' with random symmetric S."""
     random, model = np.random.default_rng(validation.integer("seed", seed)), robot.model.copy()
     far = validation.scalar("far", far, low=0.0, high=2.0)
-    spread = far * np.array([0.5, 1, 1, 1, 0.1, 0.1, 0.1, 0.1, 0.1, 0.1])
     for j in range(1, model.njoints):
         phi = np.array(model.inertias[j].toDynamicParameters())
         if is_body(phi):
-            phi = from_log_cholesky(log_cholesky(phi) + spread * random.normal(size=10))[0]
-            model.inertias[j] = pin.Inertia.FromDynamicParameters(phi)
+            U, S = np.linalg.cholesky(pseudo_inertia(phi)), far * random.normal(size=(4, 4))
+            moved = parameters(U @ expm((S + S.T) / 2.0) @ U.T)
+            model.inertias[j] = pin.Inertia.FromDynamicParameters(moved)
     return replace(robot, model=model)
 
 

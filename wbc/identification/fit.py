@@ -1,11 +1,12 @@
-"""Inertias from motion and torques, by least squares over what bodies can be.
+"""Inertias from motion and torques: the best of all that bodies can be.
 
-    minimise  |(W phi - y) / noise|^2 + weight |theta - theta_0|^2,   phi = phi(theta)
+    minimise  |(W phi - y) / noise|^2 / 2 + weight sum_k d(P_k, P_k0)
 
-theta: log-Cholesky coordinates of every body, so that each estimate is that of a body, whatever the noise; friction
-stands beside them as it is, and is at least 0. What the motion does not show stays near the model's, theta_0. W is
-reduced to its triangle by QR first, so that the samples cost nothing in the search.
-Source: Rucker and Wensing 2022, Smooth parameterization of rigid-body inertia.
+P_k: pseudo-inertia of body k, linear in its ten parameters, and d: its distance from the model's
+(:mod:`wbc.identification.cones`), infinite where it belongs to no body. What the motion does not show stays near the
+model's. Friction stands beside the bodies, a number above 0 with the same distance to little. W is reduced to its
+triangle by QR first, so that the samples cost nothing in the search.
+Source: Lee, Wensing and Park 2020, Geometric robot dynamic identification: a convex programming approach.
 """
 
 from __future__ import annotations
@@ -14,18 +15,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import qr
-from scipy.optimize import least_squares
 
 from wbc import validation
 from wbc.errors import InfeasibleError, RangeError
+from wbc.identification.cones import Cone, least_squares
 from wbc.identification.parameter_base import BaseParameters, base_parameters
 from wbc.identification.pseudo_inertia import (
-    from_log_cholesky,
+    TO_PSEUDO,
     is_body,
-    log_cholesky,
     model_parameters,
     nearest_body,
-    parameters as of_pseudo,
+    parameters,
     pseudo_inertia,
 )
 from wbc.identification.regression import Regression, Samples
@@ -34,8 +34,12 @@ from wbc.robot import Robot
 from wbc.symbolic.two_velocities import PER_BODY
 from wbc.validation import Array
 
-#: Weight of the prior: a change of e-fold in one coordinate costs as much as a residual of so many deviations
-PRIOR = 1e-2
+#: Weight of the distance to the model, in squares of standard deviations
+PRIOR = 1e-4
+#: Torques are taken to be exact to this part of their root of the mean square at best
+EXACT = 1e-8
+#: Friction is thought to be this part of what would explain all torques
+LITTLE = 1e-3
 #: A body that is flat or a point gets this part of its own size, so that it has a density
 THICK = 1e-6
 
@@ -88,40 +92,25 @@ def identify(regression: Regression, samples: Samples, *, noise: Array | float |
     before = _by_dof(y - W @ guess, nv)
     if noise is None:
         free = np.linalg.lstsq(W, y, rcond=1e-10)[0]
-        deviation = np.maximum(_by_dof(y - W @ free, nv), 1e-9)
+        deviation = _by_dof(y - W @ free, nv)
     else:
         deviation = np.broadcast_to(validation.ordinary_array("noise", noise), (nv,))
         if not (deviation > 0.0).all():
             raise RangeError("noise", noise, "expected deviations above 0")
-    weigh = np.tile(1.0 / deviation, count)
+    least = max(EXACT * float(np.sqrt((y**2).mean())), np.finfo(float).tiny)
+    weigh = np.tile(1.0 / np.maximum(deviation, least), count)
     triangle = qr(np.column_stack([W * weigh[:, None], y * weigh]), mode="r")[0][: W.shape[1] + 1]
     R, z = triangle[:, :-1], triangle[:, -1]
     moving = [k for k in range(bodies) if start[PER_BODY * k : PER_BODY * (k + 1)].any()]
-    thetas = np.concatenate([log_cholesky(_solid(start[PER_BODY * k : PER_BODY * (k + 1)])) for k in moving])
-    rest = W.shape[1] - PER_BODY * bodies
-    first = np.concatenate([thetas, np.zeros(rest)])
-
-    def phi_of(x: Array) -> tuple[Array, Array]:
-        phi, slope = np.zeros(W.shape[1]), np.zeros((W.shape[1], len(x)))
-        for i, k in enumerate(moving):
-            own, here = slice(PER_BODY * k, PER_BODY * (k + 1)), slice(PER_BODY * i, PER_BODY * (i + 1))
-            phi[own], slope[own, here] = from_log_cholesky(x[here])
-        if rest:
-            phi[-rest:], slope[-rest:, -rest:] = x[-rest:], np.eye(rest)
-        return phi, slope
-
-    prior = PRIOR * np.concatenate([np.ones(len(thetas)), np.zeros(rest)])
-
-    def residuals(x: Array) -> Array:
-        return np.concatenate([R @ phi_of(x)[0] - z, prior * (x - first)])
-
-    def jacobian(x: Array) -> Array:
-        return np.vstack([R @ phi_of(x)[1], np.diag(prior)])
-
-    low = np.concatenate([np.full(len(thetas), -np.inf), np.zeros(rest)])
-    inside = np.maximum(first, low + 1e-9 * (np.arange(len(first)) >= len(thetas)))
-    found = least_squares(residuals, inside, jacobian, bounds=(low, np.inf), x_scale="jac", max_nfev=500)
-    phi = phi_of(found.x)[0]
+    cones = []
+    for k in moving:
+        own = slice(PER_BODY * k, PER_BODY * (k + 1))
+        cones.append(Cone(own, TO_PSEUDO, pseudo_inertia(_solid(start[own]))))
+    for column in range(PER_BODY * bodies, W.shape[1]):
+        if shown := float(np.linalg.norm(R[:, column])):
+            little = LITTLE * float(np.linalg.norm(z)) / shown
+            cones.append(Cone(slice(column, column + 1), np.eye(1), np.array([[little]])))
+    phi = least_squares(R, z, cones, PRIOR)
     base = base_parameters(W)
     columns = list(base.columns)
     covariance = np.linalg.inv((W * weigh[:, None])[:, columns].T @ (W * weigh[:, None])[:, columns])
@@ -149,4 +138,4 @@ def _solid(phi: Array) -> Array:
         return phi
     P = pseudo_inertia(phi)
     size = THICK * max(float(np.trace(P[:3, :3])), THICK * phi[0])
-    return of_pseudo(nearest_body(P, np.diag([size, size, size, max(phi[0], THICK)]), 1.0))
+    return parameters(nearest_body(P, np.diag([size, size, size, max(phi[0], THICK)]), 1.0))

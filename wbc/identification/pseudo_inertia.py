@@ -1,4 +1,4 @@
-"""Inertial parameters of a body that no body can be without: pseudo-inertia and its log-Cholesky coordinates.
+"""Inertial parameters of a body that no body can be without: its pseudo-inertia.
 
     P = [Sigma  h; h'  m],   Sigma = int r r' dm,   I = tr(Sigma) 1 - Sigma
 
@@ -76,48 +76,6 @@ def checked_body(field: str, phi: Array) -> Array:
     if not is_body(phi):
         raise RangeError(field, phi, "no body has such moments: its pseudo-inertia is not positive definite")
     return phi
-
-
-def log_cholesky(phi: Array) -> Array:
-    """Ten coordinates (alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3) in which every number is a body.
-
-        P = U U',  U = e^alpha [e^d1 s12 s13 t1; 0 e^d2 s23 t2; 0 0 e^d3 t3; 0 0 0 1]
-
-    Source: Rucker and Wensing 2022, Smooth parameterization of rigid-body inertia.
-
-    Raises:
-        ShapeError, NotFiniteError, RangeError: not the parameters of a body.
-    """
-    P = pseudo_inertia(checked_body("phi", phi))
-    # An upper factor is a lower one of the matrix that is turned round
-    U = np.linalg.cholesky(P[::-1, ::-1])[::-1, ::-1]
-    scale = U[3, 3]
-    U = U / scale
-    return np.array([np.log(scale), *np.log(np.diag(U)[:3]), U[0, 1], U[1, 2], U[0, 2], *U[:3, 3]])
-
-
-def from_log_cholesky(theta: Array) -> tuple[Array, Array]:
-    """(phi ``[10]``, d phi / d theta ``[10, 10]``) of log-Cholesky coordinates."""
-    U = _factor(theta)
-    P = U @ U.T
-    slopes = np.empty((16, 10))
-    slopes[:, 0] = 2.0 * P.ravel()
-    scale = U[3, 3]
-    places = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))
-    for k, (i, j) in enumerate(places, start=1):
-        change = np.zeros((4, 4))
-        # d e^d = e^d on the diagonal
-        change[i] = (U[i, j] if i == j else scale) * U[:, j]
-        slopes[:, k] = (change + change.T).ravel()
-    return parameters(P), np.asarray(FROM_PSEUDO @ slopes)
-
-
-def _factor(theta: Array) -> Array:
-    U = np.eye(4)
-    U[[0, 1, 2], [0, 1, 2]] = np.exp(theta[1:4])
-    U[0, 1], U[1, 2], U[0, 2] = theta[4:7]
-    U[:3, 3] = theta[7:10]
-    return np.asarray(np.exp(theta[0]) * U)
 
 
 def nearest_body(P: Array, scale: Array, least: float = 0.0) -> Array:
