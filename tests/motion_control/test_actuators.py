@@ -115,6 +115,8 @@ def test_what_cannot_be_is_said_with_the_joint() -> None:
         ActuatorSizing(robot, motion, 2.0, {"elbow_joint": MOTORS})
     with pytest.raises(ShapeError, match="an Actuator"):
         ActuatorSizing(robot, motion, 2.0, dict.fromkeys(robot.dof_names, 3.0))  # type: ignore[arg-type]
+    with pytest.raises(RangeError, match="no joint moves it"):
+        ActuatorSizing(robot, motion, 2.0, MOTORS, frame="base_link")
     floating = wbc.robots.load("ur5", base="floating")
     with pytest.raises(UnsupportedJointError):
         ActuatorSizing(floating, swing(floating, 2.0), 2.0, MOTORS)

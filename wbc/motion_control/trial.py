@@ -58,7 +58,8 @@ def loaded(robot: Robot, payload: float = 0.0, heavier: float = 1.0, frame: str 
     """The robot with a point mass at a frame [kg], and with links so many times heavier; default: at its tip.
 
     Raises:
-        ShapeError, NotFiniteError, RangeError: no such numbers. UnknownNameError: no such frame.
+        ShapeError, NotFiniteError, RangeError: no such numbers, or a payload at a frame that no joint moves.
+        UnknownNameError: no such frame.
     """
     payload = validation.scalar("payload", payload, low=0.0, high=1e4, unit="kg")
     heavier = validation.scalar("heavier", heavier, low=0.1, high=10.0)
@@ -68,6 +69,8 @@ def loaded(robot: Robot, payload: float = 0.0, heavier: float = 1.0, frame: str 
         body = model.inertias[i]
         model.inertias[i] = pin.Inertia(heavier * body.mass, body.lever, heavier * body.inertia)
     if payload > 0.0:
+        if where.parentJoint == 0:
+            raise RangeError("frame", where.name, "no joint moves it: a payload there is none; name another frame")
         point = pin.Inertia(payload, where.placement.translation, np.zeros((3, 3)))
         model.inertias[where.parentJoint] = model.inertias[where.parentJoint] + point
     return replace(robot, model=model)
