@@ -35,8 +35,9 @@ def device(kind: str, seed: int) -> tuple[np.ndarray, np.ndarray, float]:
 
 @pytest.mark.parametrize("kind", ["rigid", "similarity", "affine"])
 def test_exact_readings_give_the_device_back(kind: str) -> None:
-    for seed in range(3):
+    for seed, more in ((0, 0.0), (1, 0.0), (2, 0.0), (3, 1.8), (4, -1.5)):
         matrix, offset, late = device(kind, seed)
+        late += more
         found = calibrate(TIMES, path(TIMES - late) @ matrix.T + offset, path(TIMES), kind)  # type: ignore[arg-type]
         # What is left is that of the spline at both ends
         assert np.abs(found.matrix - matrix).max() < 1e-5

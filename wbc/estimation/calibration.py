@@ -8,8 +8,9 @@ A device reads y where the target is at x(t):
     similarity   M = s R             and one scale
     affine       M any 3 x 3         a scale and a tilt for each axis
 
-The parameters minimise the sum of squares (Gauss-Newton from the closed form for M and b at no delay); with x a cubic
-spline through the known positions, dx/dt is exact for it. Covariance: sigma^2 (J'J)^-1, sigma^2 from the residuals.
+The parameters minimise the sum of squares: Gauss-Newton from the best of the closed forms for M and b at many delays;
+with x a cubic spline through the known positions, dx/dt is exact for it. Readings from beside the path do not count.
+Covariance: sigma^2 (J'J)^-1, sigma^2 from the residuals.
 """
 
 from __future__ import annotations
@@ -35,6 +36,12 @@ EXCITED = 1e-3
 STEPS = 50
 #: Relative change of the parameters at which the steps end
 SETTLED = 1e-12
+#: Delays from which the search may begin are at most this long [s]
+LATEST = 2.0
+#: Of the recording: they are at most this part of its time, so that most readings count
+EDGE = 0.25
+#: How many they are, either way and none
+DELAYS = 161
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +105,8 @@ def calibrate(times: Any, readings: Any, positions: Any, kind: Kind = "affine", 
 
     Args:
         times: increasing [s], count. readings, positions: the device's and the true ones [m], count x 3, at these.
-        kind: what M may be. delay: whether the device's delay is sought, too; without it no time enters.
+        kind: what M may be. delay: whether the device's delay is sought, too, up to 2 s and a quarter of the recording
+            either way; without it no time enters.
 
     Raises:
         ShapeError, NotFiniteError, RangeError, UnknownNameError: bad input.
@@ -115,8 +123,10 @@ def calibrate(times: Any, readings: Any, positions: Any, kind: Kind = "affine", 
         raise RangeError("positions", len(x), f"{len(names)} parameters need more than {len(names) // 3} positions")
     if seek and (np.diff(t) <= 0.0).any():
         raise RangeError("times", times, "expected increasing times")
-    path = CubicSpline(t, x) if seek else None
-    data, parameters = (t, x, y), _start(kind, x, y)
+    path, data, parameters = None, (t, x, y), _start(kind, x, y)
+    if seek:
+        path = CubicSpline(t, x)
+        data, parameters = _delayed_start(kind, path, data)
     for _ in range(STEPS):
         residual, jacobian = _linearised(kind, path, data, parameters)
         step = _solved(jacobian, residual, names)
@@ -140,14 +150,33 @@ def _names(kind: Kind, delay: bool) -> tuple[str, ...]:
 
 
 def _start(kind: Kind, x: Array, y: Array) -> Parameters:
-    """M and b without delay: least squares, or the nearest rotation (Arun, Huang and Blostein 1987)."""
+    """M and b without delay: least squares, or the nearest rotation and its scale (Umeyama 1991)."""
     middle, centre = x.mean(axis=0), y.mean(axis=0)
     if kind == "affine":
         matrix = np.linalg.lstsq(x - middle, y - centre, rcond=None)[0].T
     else:
-        left, _, right = np.linalg.svd((y - centre).T @ (x - middle))
-        matrix = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
+        left, sizes, right = np.linalg.svd((y - centre).T @ (x - middle))
+        signs = np.array([1.0, 1.0, np.linalg.det(left @ right)])
+        matrix = left @ np.diag(signs) @ right
+        if kind == "similarity" and (spread := float(((x - middle) ** 2).sum())) > 0.0:
+            matrix = matrix * max(float(sizes @ signs) / spread, EXCITED)
     return matrix, centre - matrix @ middle, 0.0
+
+
+def _delayed_start(kind: Kind, path: CubicSpline, data: tuple[Array, Array, Array]) -> tuple[Any, Parameters]:
+    """The readings that lie on the path at the delay that leaves least of them, and the parameters there."""
+    t, x, y = data
+    begin, end = float(t[0]), float(t[-1])
+    most = min(LATEST, EDGE * (end - begin))
+    best, start = np.inf, (data, _start(kind, x, y))
+    for late in sorted(np.linspace(-most, most, DELAYS), key=abs):
+        on = (t - late >= begin) & (t - late <= end)
+        place, reading = path(t[on] - late), y[on]
+        matrix, offset, _ = _start(kind, place, reading)
+        left = float(np.mean((reading - place @ matrix.T - offset) ** 2))
+        if left < best:
+            best, start = left, ((t[on], x[on], reading), (matrix, offset, float(late)))
+    return start
 
 
 def _linearised(
