@@ -11,7 +11,6 @@ import pytest
 
 import wbc
 from tests.plan.scenes import CoalJudge, at
-from tests.repeats import repeats
 from wbc.robot import Robot
 from wbc.shapes import Sphere
 
