@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import copy
 import pathlib
+import re
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 
 from wbc.errors import RobotFileError
 from wbc.robot.sources.files import read_xml
 
-#: Beginnings of a URI of a folder, or of a file in it, that stands beside the file or beside a folder above it
-_NAMED = ("model://", "package://")
-_FILE = "file://"
+#: What a URI may begin with; what follows is looked for beside the file, then beside the folders above it
+_SCHEME = re.compile("(model|package|file)://")
 #: What a folder of a model names its file in, and what this is called where nothing names it
 _CONFIG, _USUAL = "model.config", "model.sdf"
 #: What an ``<include>`` says of the model in its own words; all else is said not to be read
@@ -42,10 +42,8 @@ def included(include: ElementTree.Element, file: pathlib.Path, refused: Refused)
 
 def found(uri: str, file: pathlib.Path) -> pathlib.Path | None:
     """The file that a URI in a file means; None: there is none."""
-    name = next((uri.removeprefix(start) for start in _NAMED if uri.startswith(start)), "")
-    folders = file.resolve().parents if name else (file.resolve().parent,)
-    places = (folder / (name or uri.removeprefix(_FILE)) for folder in folders)
-    place = next((place for place in places if place.exists()), None)
+    name = _SCHEME.sub("", uri, count=1)
+    place = next((folder / name for folder in file.resolve().parents if name and (folder / name).exists()), None)
     if place is None or not place.is_dir():
         return place
     config = place / _CONFIG
