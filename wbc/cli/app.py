@@ -173,9 +173,10 @@ class CommandGroup(TyperGroup):
             return self._run(ctx)
         except WbcError as error:
             from wbc.cli.console import complain
-            from wbc.cli.file_kinds import taken_elsewhere
+            from wbc.cli.refused import of_its_option, taken_elsewhere
 
-            complain(error, taken_elsewhere(error, ctx.meta.get(WORDS, ())))
+            words = ctx.meta.get(WORDS, ())
+            complain(of_its_option(error, words), taken_elsewhere(error, words))
             raise typer.Exit(BAD_INPUT) from error
         except KeyboardInterrupt:
             # While the command starts: one that has begun says what is left of its run

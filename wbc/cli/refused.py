@@ -1,4 +1,4 @@
-"""What a file is that a command was given and did not want, and which command does."""
+"""What is said of a word that a command refused: its option; of a file what it is, and which command wants it."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 import zipfile
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from wbc.errors import WbcError
@@ -113,3 +114,11 @@ def taken_elsewhere(error: WbcError, words: Sequence[str]) -> str:
     if kind is None or kind.wanted(words, error):
         return ""
     return f"; {about[0]} is {kind.name}{', for ' * bool(kind.takers)}{', '.join(kind.takers)}"
+
+
+def of_its_option(error: WbcError, words: Sequence[str]) -> WbcError:
+    """The error of a command of these words, with the option whose value was refused, where its field is another."""
+    value = str(error.value)
+    options = {option for option, word in pairwise(words) if word == value and option.startswith("--")}
+    named = {option for option in options if option[2:].replace("-", "_") != error.field.replace("-", "_")}
+    return error.about(named.pop()) if len(options) == 1 and named else error
