@@ -24,7 +24,7 @@ BAD_INPUT = 2
 #: Exit code after Ctrl-C
 INTERRUPTED = 130
 #: Where the context keeps the words of the command
-WORDS = "wbc.words"
+WORDS = "words"
 
 
 class Listed(NamedTuple):

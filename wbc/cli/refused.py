@@ -37,7 +37,7 @@ class FileKind:
 
 
 ROBOT = FileKind("a robot description", ("wbc robots show", "the ROBOT of a command"), ("robot", "what"))
-RECORDING = FileKind("a recording of ticks", ("wbc replay", "wbc view", "wbc convert"), ("run", "recording"))
+TICKS = FileKind("a recording of ticks", ("wbc replay", "wbc view", "wbc convert"), ("run", "recording"))
 LOG = FileKind("a log of a run", ("wbc convert", "wbc.log.load"))
 MCAP = FileKind("an MCAP recording", ("Foxglove", "wbc.formats.read_motion"))
 PLAN = FileKind("a plan of a walk", ("wbc walk --plan", "wbc walk compare"))
@@ -52,7 +52,7 @@ PAGE = FileKind("a page", ("a browser",))
 FOLDERS = {
     "request.json": FileKind("the folder of a walk", ("wbc walk check", "wbc walk resume", "wbc view", "wbc convert")),
     "study.json": FileKind("the folder of a study", ("wbc study --resume",)),
-    "ticks.npz": FileKind("the folder of a run", RECORDING.takers),
+    "ticks.npz": FileKind("the folder of a run", TICKS.takers),
 }
 #: What files begin with
 BEGINNINGS = (
@@ -61,7 +61,7 @@ BEGINNINGS = (
 )  # fmt: skip
 #: Members of an archive, of which the first that is there says what it is
 ARCHIVES = {
-    "about.json": RECORDING, "timing.times.npy": LAW, "table:moves.npy": PLAN, "t.npy": LOG,
+    "about.json": TICKS, "timing.times.npy": LAW, "table:moves.npy": PLAN, "t.npy": LOG,
 }  # fmt: skip
 #: What texts hold
 TEXTS = {

@@ -6,22 +6,21 @@ import copy
 import pathlib
 import re
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable
 
 from wbc.errors import RobotFileError
 from wbc.robot.sources.files import read_xml
+from wbc.robot.sources.sdf_frames import Refused
 
 #: What a URI may begin with; what follows is looked for beside the file, then beside the folders above it
 _SCHEME = re.compile("(model|package|file)://")
-#: What a folder of a model names its file in, and what this is called where nothing names it
-_CONFIG, _USUAL = "model.config", "model.sdf"
+#: What a folder of a model names its file in
+_CONFIG = "model.config"
+#: and what this is called where nothing names it
+_USUAL = "model.sdf"
 #: What an ``<include>`` says of the model in its own words; all else is said not to be read
 _OWN = ("uri", "name", "plugin", "placement_frame")
 #: What it says in the place of the model
 _INSTEAD = ("pose", "static")
-
-#: Makes the error of a reason
-Refused = Callable[[str], Exception]
 
 
 def with_includes(model: ElementTree.Element, file: pathlib.Path, refused: Refused) -> None:
