@@ -16,7 +16,7 @@ _SCHEME = re.compile("(model|package|file)://")
 #: What a folder of a model names its file in
 _CONFIG = "model.config"
 #: and what this is called where nothing names it
-_USUAL = "model.sdf"
+_UNNAMED = "model.sdf"
 #: What an ``<include>`` says of the model in its own words; all else is said not to be read
 _OWN = ("uri", "name", "plugin", "placement_frame")
 #: What it says in the place of the model
@@ -48,7 +48,7 @@ def found(uri: str, file: pathlib.Path) -> pathlib.Path | None:
     config = place / _CONFIG
     named = read_xml(config)[1].findall("sdf") if config.is_file() else []
     newest = max(named, key=lambda one: version_of(one.get("version", "")), default=None)
-    inside = place / (_USUAL if newest is None else (newest.text or "").strip())
+    inside = place / (_UNNAMED if newest is None else (newest.text or "").strip())
     return inside if inside.is_file() else None
 
 
