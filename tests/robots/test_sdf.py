@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import numpy as np
@@ -140,6 +141,63 @@ def test_models_in_models_are_where_their_poses_say(seed: int, tmp_path: Path) -
     assert pin.centerOfMass(robot.model, robot.model.createData(), q) == pytest.approx(center, abs=1e-9)
 
 
+def into_files(element: ElementTree.Element, folder: Path, rng: np.random.Generator, depth: int = 0) -> None:
+    """Put every model in a model, under another name and elsewhere, into a file of its own, that is included."""
+    for k, inner in enumerate(element):
+        if inner.tag != "model":
+            continue
+        into_files(inner, folder, rng, depth + 1)
+        name, place = str(inner.get("name")), folder / f"{inner.get('name')}_{depth}"
+        pose, frame = inner.find("pose"), inner.attrib.pop("placement_frame", "")
+        assert pose is not None
+        include = ElementTree.Element("include")
+        ElementTree.SubElement(include, "name").text = name
+        include.append(pose)
+        inner.remove(pose)
+        if frame:
+            ElementTree.SubElement(include, "placement_frame").text = frame
+        inner.append(ElementTree.fromstring("<pose>1 2 3 0 0 1</pose>"))
+        inner.set("name", "other")
+        file, uri = (place / "model.sdf", f"model://{place.name}") if rng.random() < 0.5 else (place, place.name)
+        ElementTree.SubElement(include, "uri").text = uri
+        file.parent.mkdir(exist_ok=True)
+        file.write_text(f'<sdf version="1.9">{ElementTree.tostring(inner, encoding="unicode")}</sdf>')
+        element[k] = include
+
+
+@pytest.mark.parametrize("seed", range(repeats(12)))
+def test_included_models_are_models_in_the_model(seed: int, tmp_path: Path) -> None:
+    made, file = RandomSdf(seed), tmp_path / "x.sdf"
+    text = made.text(made.draw())
+    file.write_text(text)
+    whole, tree = wbc.robots.load(file), ElementTree.fromstring(text)
+    into_files(tree[0], tmp_path, np.random.default_rng(seed))
+    (tmp_path / "y.sdf").write_text(ElementTree.tostring(tree, encoding="unicode"))
+    (tmp_path / "world.sdf").write_text(
+        '<sdf version="1.9"><world name="w"><include><uri>model://sun</uri></include><include><uri>y.sdf</uri></include>'
+        "</world></sdf>"
+    )
+    assert ("<include>" in (tmp_path / "y.sdf").read_text()) == (len(made.models) > 1)
+    for name in ("y.sdf", "world.sdf"):
+        parts, q = wbc.robots.load(tmp_path / name), whole.random(np.random.default_rng(seed))
+        assert parts.frame_names == whole.frame_names
+        for frame in whole.frame_names:
+            assert parts.pose(q, frame).isApprox(whole.pose(q, frame), 1e-9), frame
+        assert pin.crba(parts.model, parts.model.createData(), q) == pytest.approx(
+            pin.crba(whole.model, whole.model.createData(), q), abs=1e-9
+        )
+
+
+def test_axes_of_an_included_file_are_as_its_own_version_has_them(tmp_path: Path) -> None:
+    turned = ARM.replace("</joint>", "<pose>0 0 0 1 0 0</pose><axis><xyz>0 1 0</xyz></axis></joint>")
+    for version, about in (("1.4", [0.0, 1.0, 0.0]), ("1.9", [0.0, np.cos(1.0), np.sin(1.0)])):
+        (tmp_path / "arm.sdf").write_text(f'<sdf version="{version}"><model name="arm">{turned}</model></sdf>')
+        hold = '<joint name="h" type="fixed"><parent>world</parent><child>arm::a</child></joint>'
+        robot = load(f"<include><uri>arm.sdf</uri></include>{hold}", tmp_path)
+        turn = pin.log3(robot.pose(np.array([0.5]), "arm::b").rotation)
+        assert turn == pytest.approx(0.5 * np.array(about), abs=1e-12)
+
+
 LINK = '<link name="{}"><inertial><mass>2</mass></inertial></link>'
 ARM = LINK.format("a") + LINK.format("b") + '<joint name="j" type="revolute"><parent>a</parent><child>b</child></joint>'
 
@@ -158,7 +216,9 @@ def load(inside: str, tmp_path: Path, *, world: str = "") -> wbc.robot.Robot:
         (lambda s: s + '<frame name="f" attached_to="g"/><frame name="g" attached_to="f"/>', "'f' .* itself"),
         (lambda s: s.replace("<child>b", "<child>a"), "between the link 'a' and itself"),
         (lambda s: s.replace("<inertial>", '<inertial auto="true">', 1), "'a' states no inertia"),
-        (lambda s: s + "<include><uri>model://hand</uri></include>", "'model://hand' is not followed"),
+        (lambda s: s + "<include><uri>model://hand</uri></include>", "'model://hand' leads nowhere"),
+        (lambda s: s + "<include><uri>x.sdf</uri></include>", "x.sdf includes itself"),
+        (lambda s: s + '<include merge="true"><uri>x.sdf</uri></include>', "'x.sdf' is merged"),
         (lambda s: s + '<model name="n"/><frame name="f" attached_to="n"/>', "'n', which has no link"),
         (lambda s: s.replace("<child>b", "<child>elbow") + '<frame name="elbows" attached_to="b"/>', "mean elbows"),
     ],

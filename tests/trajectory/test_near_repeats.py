@@ -83,3 +83,16 @@ def test_durations_hardly_change_with_the_distance() -> None:
     assert np.ptp(one) < 1e-3
     assert np.ptp(two) < 0.15 * two.min()
     assert two.max() < 1.75 * one.min()
+
+
+@pytest.mark.parametrize("seed", range(repeats(6)))
+def test_repeats_are_tiny_parts_of_long_paths(seed: int) -> None:
+    """Turns beside millimetres, with two waypoints that are a few millionths of one apart."""
+    rng = np.random.default_rng(seed)
+    points = rng.normal(size=(4, 3)) * [1.0, 1.0, 3e3]
+    aside = rng.normal(size=3)
+    points = np.insert(points, 2, points[1] + 2e-6 * aside / np.linalg.norm(aside), axis=0)
+    found = time_optimal(spline_path(points), velocity=[1e-3, 2.0, 50.0], acceleration=[1.0, 5.0, 300.0])
+    assert found.certificate.ratio <= 1.0 + 1e-6
+    passed = found.path.evaluate(found.path.knots)
+    assert all(np.abs(passed - point).max(axis=1).min() < 1e-9 for point in points)

@@ -23,6 +23,8 @@ from wbc.errors import UnknownNameError, WbcError
 BAD_INPUT = 2
 #: Exit code after Ctrl-C
 INTERRUPTED = 130
+#: Where the context keeps the words of the command
+WORDS = "words"
 
 
 class Listed(NamedTuple):
@@ -151,6 +153,7 @@ class CommandGroup(TyperGroup):
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """The command that was asked for, imported."""
+        ctx.meta[WORDS] = list(args)
         given, found, rest = super().resolve_command(ctx, args)
         if not found:
             return given, found, rest
@@ -170,8 +173,10 @@ class CommandGroup(TyperGroup):
             return self._run(ctx)
         except WbcError as error:
             from wbc.cli.console import complain
+            from wbc.cli.refused import of_its_option, taken_elsewhere
 
-            complain(error)
+            words = ctx.meta.get(WORDS, ())
+            complain(of_its_option(error, words), taken_elsewhere(error, words))
             raise typer.Exit(BAD_INPUT) from error
         except KeyboardInterrupt:
             # While the command starts: one that has begun says what is left of its run

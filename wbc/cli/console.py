@@ -88,9 +88,9 @@ def tell(text: object, kind: str = "") -> None:
     err().print(f"[yellow]{kind}[/yellow]: {escape(str(text))}" if kind else escape(str(text)), soft_wrap=True)
 
 
-def complain(error: WbcError) -> None:
-    """An error as one line."""
-    line = Text.assemble(("error: ", "bold red"), " ".join(str(error).split()))
+def complain(error: WbcError, more: str = "") -> None:
+    """An error as one line, and what else there is to say of it."""
+    line = Text.assemble(("error: ", "bold red"), " ".join(str(error).split()), more)
     err().print(line, soft_wrap=True)
 
 

@@ -19,7 +19,7 @@ class PlanPath(SceneOptions):
     Every configuration that puts the frame at the target is a goal. Ends with 3 where no path is found in the time, and
     with 2 and the reason where start or goal is not free.
 
-    Example: wbc plan panda --target 0.5,-0.3,0.4 --box 0.5,0,0.3,0.3,0.05,0.6 --out law.npz
+    Example: wbc plan panda --target 0.45,-0.45,0.3 --box 0.55,0,0.35,0.2,0.1,0.7 --out law.npz
     """
 
     PANEL: ClassVar[str] = "How it searches, and what it writes"

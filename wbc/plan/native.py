@@ -56,6 +56,7 @@ class NativePlanner:
     Attributes:
         scene: whose pairs are kept apart. path_rows: of every configuration of a path.
         low, high: limits of x. sample_low, sample_high: where samples are drawn.
+        period: x and x + period are one configuration; 0: no others are.
     """
 
     def __init__(self, scene: PlanningScene, rows: PlanningRows, p: Array, limits: tuple[Array, Array]) -> None:
@@ -64,6 +65,7 @@ class NativePlanner:
         n, bodies, pairs, frames = coordinates.count, len(swept.bodies), len(scene.pairs), len(coordinates.tree.frames)
         self.scene, self.path_rows, self._p, self._call = scene, rows, p, library()
         self.low, self.high, self.sample_low, self.sample_high = (side.copy() for side in (*limits, *limits))
+        self.period = np.zeros(n)
         self.bounded = bool(np.isfinite(limits).all())
         self._sweep, self._required = NativeSweep(swept), swept.required - OPEN
         self._struct = it = _PlanStruct(
@@ -76,7 +78,7 @@ class NativePlanner:
         self._normals, outline = np.zeros((pairs, 3)), ctypes.sizeof(_OutlineStruct)
         self._arrays: dict[str, Array] = {
             "low": self.low, "high": self.high, "sample_low": self.sample_low, "sample_high": self.sample_high,
-            "scale": 1.0 / coordinates.scale, "weight": coordinates.scale**-2.0,
+            "scale": 1.0 / coordinates.scale, "weight": coordinates.scale**-2.0, "period": self.period,
             "gone": np.zeros((frames, LANES)), "normals": self._normals, "boxes": np.zeros((bodies, 15)),
             "reaches": np.zeros((bodies, depth)), "offs": np.zeros((bodies, depth + 1, LANES)),
             "lane_pose": np.zeros((frames, 12, LANES)), "lane_centre": np.zeros((bodies, 3, LANES)),
@@ -152,6 +154,11 @@ class NativePlanner:
         """A root of the tree from the start, 0, or from the goals, 1."""
         self._x[:] = x
         self._call.wbc_plan_root(self.at, tree, self._at_x)
+
+    def go_round(self, rounds: bool) -> None:
+        """Whether joints without end turn either way to a configuration, else the short one."""
+        free = [k for k in self.scene.coordinates.circles if np.isinf(self.low[k]) and self._arrays["weight"][k] > 0.0]
+        self.period[free] = 2.0 * np.pi if rounds else 0.0
 
     def free(self, x: Array) -> bool:
         """Whether x is within limits, keeps the rows and is clear."""

@@ -293,6 +293,8 @@ class _Search:
         #: near start and goals, with room on all sides
         self.first, self.last = self.start, list[Array]()
         self.nodes, self.pad, self.shortening, self.drawn = (0, 0), PAD, 0.0, 0
+        #: whether joints without end may turn the other way, too: where no path was found the short way
+        self.rounds = False
 
     def check_start(self) -> None:
         """Refuse a start that breaks a constraint."""
@@ -399,6 +401,7 @@ class _Search:
                 ):
                     raise self._nothing(f"no path leads to any of {len(reasons)} goals: {'; '.join(set(reasons))}")
                 samples *= 2
+                self.rounds = True
                 self.pad = max(LEAST_PAD, 0.25 * self.pad)
                 continue
             searched += 1
@@ -418,6 +421,7 @@ class _Search:
         """A path of one search, made shorter."""
         native, options = self.native, self.options
         native.pad(self.pad)
+        native.go_round(self.rounds)
         native.begin(options.seed + 7919 * attempt)
         reach = RANGE * native.distance(native.sample_low, native.sample_high)
         longest_edge = reach if options.range is None else options.range
@@ -440,7 +444,7 @@ class _Search:
         if met != 1:
             return None
         points = native.path()
-        end = min(roots, key=lambda k: float(np.abs(points[-1] - self.last[k]).max())) if len(roots) > 1 else roots[0]
+        end = min(roots, key=lambda k: native.distance(points[-1], self._turned(k, points[-1])[0]))
         begin = process_time()
         points = native.shortened(self._ended(points, end), options.cuts, ROUNDS)
         self.shortening += process_time() - begin
@@ -449,12 +453,21 @@ class _Search:
     def _ended(self, points: Array, goal: int) -> Array:
         """A path between what is near start and goal, with both."""
         whole = [points] if self.first is self.start else [self.start[None], points]
-        return np.concatenate(whole if self.last[goal] is self.goals[goal] else [*whole, self.goals[goal][None]])
+        if self.last[goal] is not self.goals[goal]:
+            whole.append(self._turned(goal, points[-1])[1][None])
+        return np.concatenate(whole)
+
+    def _turned(self, goal: int, x: Array) -> tuple[Array, Array]:
+        """What is near a goal, and the goal, as joints without end came round to them at x."""
+        off, period = x - self.last[goal], self.native.period
+        turns = period * np.round(np.divide(off, period, out=np.zeros_like(off), where=period > 0.0))
+        return self.last[goal] + turns, self.goals[goal] + turns
 
     def _nothing(self, reason: str = "") -> NoPathError:
-        tree, goals = self.native.node(0), np.array(self.last)
+        tree, goals = self.native.node(0), self.last
         scale = self.planner.coordinates.scale
-        off = np.array([np.linalg.norm((tree - x) / scale, axis=1) for x in goals])
+        ends = (self._turned(k, tree)[0] for k in range(len(goals)))
+        off = np.array([np.linalg.norm((tree - x) / scale, axis=1) for x in ends])
         goal, node = np.unravel_index(int(off.argmin()), off.shape)
         distance = float(off[goal, node])
         searched = (

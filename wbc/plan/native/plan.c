@@ -47,15 +47,19 @@ double wbc_plan_away(plan_t *p, double *x, double room, double most) {
     return most;
 }
 
-/* The path through where the trees met; the number of points, or -1 where there is no room */
+/* The path through where the trees met, to a goal or the same configuration; the number of points, or -1 where there is no room */
 int wbc_plan_path(const plan_t *p, double *x, int room) {
+    const double *one = p->node[0] + p->meet[0] * p->n, *other = p->node[1] + p->meet[1] * p->n;
     int count = 0;
     for (int k = p->meet[0]; k >= 0; k = p->parent[0][k]) count++;
     if (count > room) return -1;
     for (int k = p->meet[0], at = count; k >= 0; k = p->parent[0][k]) copy_x(p, p->node[0] + k * p->n, x + --at * p->n);
     for (int k = p->parent[1][p->meet[1]]; k >= 0; k = p->parent[1][k]) {
         if (count == room) return -1;
-        copy_x(p, p->node[1] + k * p->n, x + count++ * p->n);
+        double *to = x + count++ * p->n;
+        copy_x(p, p->node[1] + k * p->n, to);
+        for (int m = 0; m < p->n; m++)
+            if (p->period[m] > 0.0) to[m] += p->period[m] * rint((one[m] - other[m]) / p->period[m]);
     }
     return count;
 }

@@ -64,6 +64,7 @@ typedef struct {
     const double *low, *high;               /* n: limits */
     const double *sample_low, *sample_high; /* n: where samples are drawn */
     const double *weight, *scale;           /* n: what a coordinate counts, its square and itself */
+    const double *period;                   /* n: x and x + period are one configuration; 0: no others are */
     int n, pairs, blocks, capacity, seeds, count[2];
     double range;     /* an edge is no longer */
     double step;      /* of edges with rows: between two projections */
@@ -94,7 +95,21 @@ static double metric(const plan_t *p, const double *x, const double *y) {
     return sqrt(sum);
 }
 
+/* y becomes the one nearest to x of those that are the same configuration */
+static void bring(const plan_t *p, const double *x, double *y) {
+    for (int k = 0; k < p->n; k++)
+        if (p->period[k] > 0.0) y[k] -= p->period[k] * rint((y[k] - x[k]) / p->period[k]);
+}
+
 static void copy_x(const plan_t *p, const double *from, double *to) { memcpy(to, from, p->n * sizeof *to); }
+
+/* The distance of x from the nearest of those that are the configuration y */
+static double metric_round(const plan_t *p, const double *x, const double *y) {
+    double near[p->n];
+    copy_x(p, y, near);
+    bring(p, x, near);
+    return metric(p, x, near);
+}
 
 /* z = x + t (y - x) */
 static void along_x(const plan_t *p, const double *x, const double *y, double t, double *z) {

@@ -25,7 +25,8 @@ static int add(plan_t *p, int tree, const double *x, int parent) {
     return p->count[tree]++;
 }
 
-static int nearest_node(const plan_t *p, int tree, const double *x) {
+/* The nearest node to x, which becomes the one nearest to that node of those that are the same configuration */
+static int nearest_node(const plan_t *p, int tree, double *x) {
     const int n = p->n, blocks = (p->count[tree] + LANES - 1) / LANES;
     const lanes_t *y = (const lanes_t *)p->lanes[tree];
     lanes_t nearest = {0}, at = {0}, z[n];
@@ -33,14 +34,21 @@ static int nearest_node(const plan_t *p, int tree, const double *x) {
     for (int k = 0; k < n; k++) z[k] = (lanes_t){0} + p->scale[k] * x[k];
     for (int b = 0; b < blocks; b++) {
         lanes_t sum = {0};
-        for (int k = 0; k < n; k++, y++) sum += (*y - z[k]) * (*y - z[k]);
+        for (int k = 0; k < n; k++, y++) {
+            const double period = p->scale[k] * p->period[k];
+            lanes_t off = *y - z[k];
+            for (int l = 0; period > 0.0 && l < LANES; l++) off[l] -= period * rint(off[l] / period);
+            sum += off * off;
+        }
         const mask_t nearer = sum < nearest;
         nearest = chosen(nearer, sum, nearest), at = chosen(nearer, (lanes_t){0} + b, at);
     }
     int best = 0;
     for (int l = 1; l < LANES; l++)
         if (nearest[l] < nearest[best]) best = l;
-    return LANES * (int)at[best] + best;
+    best += LANES * (int)at[best];
+    bring(p, p->node[tree] + n * best, x);
+    return best;
 }
 
 /* From node `from` towards a target, by the pieces of the way of a base that rolls, and no farther than `range` along each; the last node
@@ -81,10 +89,10 @@ static void box_of_samples(const plan_t *p, double *low, double *high) {
     copy_x(p, p->sample_low, low);
     copy_x(p, p->sample_high, high);
     for (int k = 0; k < n && p->longest < INFINITY; k++) {
-        if (p->weight[k] <= 0.0) continue;
+        if (p->weight[k] <= 0.0 || p->period[k] > 0.0) continue;
         double least = INFINITY, most = -INFINITY;
         for (const double *goal = p->node[1]; goal < p->node[1] + p->seeds * n; goal += n) {
-            const double way = metric(p, start, goal), middle = 0.5 * (start[k] + goal[k]), off = middle - start[k];
+            const double way = metric_round(p, start, goal), middle = 0.5 * (start[k] + goal[k]), off = middle - start[k];
             const double half = sqrt(0.25 * fmax(p->longest * p->longest - way * way, 0.0) / p->weight[k] + off * off);
             least = fmin(least, middle - half), most = fmax(most, middle + half);
         }
@@ -98,9 +106,9 @@ static void draw_of(plan_t *p, const double *low, const double *high, double *x)
     for (int again = 0; again < INFORMED; again++) {
         for (int k = 0; k < n; k++) x[k] = low[k] + uniform(p) * (high[k] - low[k]);
         if (p->longest == INFINITY) return;
-        const double gone = metric(p, x, p->node[0]);
+        const double gone = metric_round(p, x, p->node[0]);
         for (int g = 0; g < p->seeds && gone < p->longest; g++)
-            if (gone + metric(p, x, p->node[1] + g * n) < p->longest) return;
+            if (gone + metric_round(p, x, p->node[1] + g * n) < p->longest) return;
     }
 }
 
@@ -110,7 +118,7 @@ void wbc_plan_draw(plan_t *p, double *x) { draw_of(p, p->sample_low, p->sample_h
  * not free is drawn by near samples only (Yershova, Jaillet, Simeon and LaValle, Dynamic-domain RRTs, 2005). -1: a tree is full */
 int wbc_plan_grow(plan_t *p, int samples) {
     const int n = p->n, single = has_rows(p) || p->rolls || !p->pairs;
-    double x[LANES * n], ends[LANES * n], low[n], high[n];
+    double x[LANES * n], ends[LANES * n], low[n], high[n], target[n];
     stretch_t parts[LANES];
     box_of_samples(p, low, high);
     for (int k = 0; k < samples;) {
@@ -136,7 +144,7 @@ int wbc_plan_grow(plan_t *p, int samples) {
             if (p->count[tree] == p->capacity) return -1;
             if (node < 0 || reached < 0) p->domain[tree][from[m]] = p->near_enough;
             if (node < 0) continue;
-            const double *target = p->node[tree] + n * node;
+            copy_x(p, p->node[tree] + n * node, target);
             int other = nearest_node(p, !tree, target);
             do {
                 other = extend(p, !tree, other, target, p->range, &reached);

@@ -16,6 +16,7 @@ from wbc.multibody import own, single_joint
 from wbc.robot.loops import Kind, Loop
 from wbc.robot.sources.description import ROOT, Description, Mimic, own_base, with_base
 from wbc.robot.sources.sdf_frames import MODEL, WORLD, SdfFrames, SdfPart
+from wbc.robot.sources.sdf_includes import axes_in_model, found, included, with_includes
 from wbc.robot.sources.urdf_checks import Remarks, check_inertias, has_direction, meant, shown
 from wbc.validation import Array
 
@@ -91,17 +92,17 @@ class _Joint:
 
 
 def read_sdf(path: pathlib.Path, tree: ElementTree.Element, base: str | None = None) -> Description:
-    """The description in an SDF file of one model, with the models in it, whose names lead: ``arm::hand``. A link hangs
-    on the first joint of which it is the child; what no such joint leads to hangs on another one, as its parent. All
-    other joints close loops.
+    """The description in an SDF file of one model, with the models in it, or that it includes, whose names lead:
+    ``arm::hand``. A link hangs on the first joint of which it is the child; what no such joint leads to hangs on
+    another one, as its parent. All other joints close loops.
 
     A model that no joint ties to the world, and that is not static, has a floating base by itself, at the pose of its
     root link.
 
     Raises:
-        RobotFileError: no or several models, files that are included, joints of a kind, frames or links that are not
-            there or there twice, numbers that are none, inertias that shapes give, links that nothing ties to the
-            others; what they are and where.
+        RobotFileError: no or several models, included files that are not there, joints of a kind, frames or links
+            that are not there or there twice, numbers that are none, inertias that shapes give, links that nothing ties
+            to the others; what they are and where.
     """
     return _Reader(path, tree).read(base)
 
@@ -109,23 +110,30 @@ def read_sdf(path: pathlib.Path, tree: ElementTree.Element, base: str | None = N
 class _Reader:
     def __init__(self, path: pathlib.Path, tree: ElementTree.Element) -> None:
         self._path, self._remarks, self._tensors = path, Remarks(path), dict[str, Array]()
-        models = [*tree.findall("model"), *tree.findall("world/model")]
-        if len(models) != 1:
-            inside = "; an <include> is not followed" * (tree.find("world/include") is not None)
-            raise self._error(f"{len(models)} models, expected one{inside}")
+        self._model = self._outermost(tree)
         if tree.find("world/joint") is not None:
             raise self._error("a <joint> of the world is not read: put it into the model")
-        for beside in tree.findall("world/include"):
-            self._remarks.add("sdf", f"no part of the robot is the <include> of {beside.findtext('uri')!r}")
-        self._model = models[0]
+        with_includes(self._model, path, self._error)
         self._gravity = tree.findtext("world/gravity")
         self._frames = SdfFrames(self._model, self._error)
         self._links = self._frames.of_kind("link")
-        version = [int(x) for x in tree.get("version", "1.6").split(".")[:2] if x.isdigit()]
-        self._axes_in_model = version < [1, 5]
+        self._axes_in_model = axes_in_model(tree.get("version", ""))
         self._joints = [self._joint(joint) for joint in self._frames.of_kind("joint").values()]
         self._static = (self._model.findtext("static") or "").strip() in ("true", "1")
         self._held = any(joint.parent == WORLD for joint in self._joints)
+
+    def _outermost(self, tree: ElementTree.Element) -> ElementTree.Element:
+        """The one model; of a world that has none itself the one that it includes and that is there."""
+        models = [*tree.findall("model"), *tree.findall("world/model")]
+        includes = {(one.findtext("uri") or "").strip(): one for one in tree.findall("world/include")}
+        there = [one for uri, one in includes.items() if not models and found(uri, self._path)]
+        beside = [repr(uri) for uri, one in includes.items() if one not in there]
+        if (count := len(models) + len(there)) != 1:
+            lost = f"; no file beside it or above is the <include> of {', '.join(beside)}" * bool(beside and not models)
+            raise self._error(f"{count} models, expected one{lost}")
+        for uri in beside:
+            self._remarks.add("sdf", f"no part of the robot is the <include> of {uri}")
+        return models[0] if models else included(there[0], self._path, self._error)
 
     def read(self, base: str | None) -> Description:
         hangs = self._tree()

@@ -59,9 +59,6 @@ class SdfFrames:
 
     def _gather(self, scope: str, model: ElementTree.Element) -> None:
         for element in model:
-            if element.tag == "include":
-                uri = (element.findtext("uri") or "").strip()
-                raise self._refused(f"<include> of {uri!r} is not followed: put that model's links and joints here")
             if element.tag not in _PLACED:
                 continue
             if not element.get("name"):

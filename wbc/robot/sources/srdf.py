@@ -148,4 +148,6 @@ def read_srdf(path: pathlib.Path) -> Srdf:
     _, root = read_xml(path)
     if root.tag != "robot":
         raise RobotFileError("srdf", str(path), f"no SRDF: the root element is <{root.tag}>")
+    if root.find("link") is not None or root.find("joint") is not None:
+        raise RobotFileError("srdf", str(path), "no SRDF: it has links or joints of its own, as a URDF file")
     return Srdf(path, root)

@@ -22,6 +22,9 @@ from wbc.validation import Array
 #: Shares by which a squared speed is lowered when rounding leaves no path acceleration
 LOWERED = (0.0, 1e-12, 1e-10, 1e-8, 1e-6, 1e-4, 1e-3, 1e-2)
 
+#: Intervals in the program's units are no shorter: toppra takes 2 u of a shorter one for none
+SHORTEST = 1e-8
+
 #: Squared speeds in the program's units that are not bounded otherwise
 LARGEST = 1e8
 
@@ -68,19 +71,20 @@ class SpeedProgram:
 
     def __init__(self, s: Array, rows: Sequence[PathRows], squared: Array) -> None:
         self.length = float(s[-1] - s[0])
-        sigma = (s - s[0]) / self.length
-        sigma[-1] = 1.0
+        spans = np.diff(s) / self.length
         self.count = len(s) - 1
-        self.spans = np.diff(sigma)
+        # Of a shorter one u is that much less
+        self.spans = np.maximum(spans, SHORTEST)
         self._given = (s, rows, squared)
         self.unit = _unit_of_time(rows, squared, np.diff(s))
         scale = self.length / self.unit**2
-        constraints = [_Coefficients(_parameters(r, self.spans, scale, self.length)) for r in rows]
+        longer = self.spans / spans
+        constraints = [_Coefficients(_parameters(r, spans, longer, scale, self.length)) for r in rows]
         bounds = np.zeros((self.count + 1, 2))
         bounds[:, 1] = np.minimum(squared * (self.unit / self.length) ** 2, LARGEST)
         self.bounds = bounds
         constraints.append(_Coefficients((None, None, None, None, None, None, bounds)))
-        self._solver = seidelWrapper(constraints, _ToppraPath(), sigma, 1)
+        self._solver = seidelWrapper(constraints, _ToppraPath(), np.append(0.0, np.cumsum(self.spans)), 1)
         self._up, self._down = np.array([1e-9, -1.0]), np.array([-1e-9, 1.0])
 
     def fastest(self, start: float = 0.0, end: float = 0.0) -> PathSpeeds:
@@ -143,14 +147,15 @@ class SpeedProgram:
         return out
 
 
-def _parameters(rows: PathRows, spans: Array, scale: float, length: float) -> tuple[Any, ...]:
-    """Rows at both ends of each interval in terms of u and of x at its beginning, in units of length and time.
+def _parameters(rows: PathRows, spans: Array, longer: Array, scale: float, length: float) -> tuple[Any, ...]:
+    """Rows at both ends of each interval in terms of u and of x at its beginning, in units of length and time, on
+    intervals that are so many times as long as ``spans``.
 
     Each row is divided by its largest factor, because the tolerances of the linear programs are absolute.
     """
     count, _, size = rows.a.shape
     right = rows.a[:, 1] + 2.0 * (spans * length)[:, None] * rows.b[:, 1]
-    a = np.concatenate([rows.a[:, 0], right], axis=1) * scale
+    a = np.concatenate([rows.a[:, 0], right], axis=1) * scale * longer[:, None]
     b = rows.b.reshape(count, 2 * size) * (scale * length)
     c = rows.c.reshape(count, 2 * size) - 1.0
     if rows.both:
