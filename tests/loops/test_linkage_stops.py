@@ -105,24 +105,29 @@ def test_the_row_of_a_joint_says_where_it_stops(seed: int, later: bool) -> None:
     matrix, lower, upper, bent = (np.array(part) for part in look(q, v))
     speed, begins, reach = size(v), q + (0.5 * DT * v if later else 0.0), robot.nv**0.25 * DT
 
-    def stop(velocity: Array) -> tuple[Array, float]:
-        """Where joints stop whose bend is that of v, but for its speed, and the time that they count on."""
-        time = DT + 0.5 * size(velocity) / STOP
-        share = (size(velocity) / speed) ** 2
-        return begins + velocity * time + 0.5 * share * bent.ravel() * (time - DT) ** 2, time
-
     kept, h = robot.limits, 1e-6
     first = len(matrix) - robot.nv
     for k in range(robot.nv):
-        end, row = (kept.position_upper[k], upper) if v[k] > 0.0 else (kept.position_lower[k], lower)
+        # The end next to which it stops, from which it may move off; bends are not counted on to turn it round
+        middle = 0.5 * (kept.position_lower[k] + kept.position_upper[k])
+        sign = 1.0 if begins[k] + v[k] * (DT + 0.5 * speed / STOP) > middle else -1.0
+        end, row = (kept.position_upper[k], upper) if sign > 0.0 else (kept.position_lower[k], lower)
+        toward, bends = max(sign * v[k], 0.0), sign * max(sign * bent[k, 0], 0.0)
         # The speed at which it would stop at its limit but for the bend, of those that it may reach
-        about = STOP * (np.sqrt(DT**2 + 2.0 * abs(end - begins[k]) * speed / abs(v[k]) / STOP) - DT)
-        there = v / speed * min(max(about, speed - reach), speed + reach)
-        reached, time = stop(there)
-        assert matrix[first + k] @ there - row[first + k, 0] == pytest.approx((reached[k] - end) / time, abs=1e-9)
-        slopes = [
-            (stop(there + h * unit)[0][k] - stop(there - h * unit)[0][k]) / (2.0 * h) for unit in np.eye(robot.nv)
-        ]
+        room = max(2.0 * sign * (end - begins[k]), 0.0)
+        about = STOP * (np.sqrt(DT**2 + room / (toward / speed + 1e-12) / STOP) - DT)
+        about = min(max(about, speed - reach), speed + reach)
+        there = v / speed * about
+
+        def stop(velocity: Array, k: int = k, moves: bool = toward > 0.0, bends: float = bends) -> float:
+            """Where it stops if it bends as at v, but for its speed."""
+            time = 0.5 * size(velocity) / STOP
+            away = 0.0 if moves else velocity[k] * (0.5 * about / STOP - time)
+            return float(begins[k] + velocity[k] * (DT + time) + away + 0.5 * (size(velocity) / speed * time) ** 2 * bends)
+
+        time = DT + 0.5 * about / STOP
+        assert matrix[first + k] @ there - row[first + k, 0] == pytest.approx((stop(there) - end) / time, abs=1e-9)
+        slopes = [(stop(there + h * unit) - stop(there - h * unit)) / (2.0 * h) for unit in np.eye(robot.nv)]
         assert matrix[first + k] == pytest.approx(np.array(slopes) / time, abs=1e-6)
 
 
