@@ -77,9 +77,9 @@ class LinkageSpeed(Constraint):
     The row of a joint is the line over dt + t, with s and c t^2 to first order about the speed along v0 at which the
     joint comes to its limit but for c, of those that A lets it reach; no row asks for more than braking by D does, or
     by what of it bends leave within A. A linkage of one motion turns back no faster than it stops before the limit
-    behind. Of one of several motions, which may turn, the limit is the one next to which the joint stops: a joint that
-    leaves it may come back within t of its present s, and bends do not turn it round. Where accelerations are commanded a tick moves by (v0 + v) dt / 2, and q + v0 dt / 2 is in place of q: what
-    brakes then stays within the line as before.
+    behind. One of several may turn: of its joints the limit is that next to which they stop, c counts only towards it,
+    and what leaves it may come back within t at s. Where accelerations are commanded a tick moves by (v0 + v) dt / 2,
+    and q + v0 dt / 2 is in place of q: what brakes then stays within the line as before.
 
     Attributes:
         limits: whose limits they are.
@@ -220,7 +220,7 @@ def bend_of(robot: Robot, kin: Tracer, linkage: Linkage, limits: Array) -> Bend:
     bias = kin.second(error, MotionExpressions(kin.kinematics))[1][rows]
     jacobian = ca.densify(kin.jacobian(error))[rows, dofs]
     seen = jacobian @ ca.diag(weights)
-    solve = _solver(seen)
+    solve = dependent_solver(seen)
     forces = solve(bias)
     weak = solve(forces)
     asked, other = (-weights * (seen.T @ each) for each in (forces, weak))
@@ -273,7 +273,7 @@ def _bracket(q: ca.SX, tangent: ca.SX, v: ca.SX, c: ca.SX) -> ca.SX:
     return ca.densify(ca.substitute(out, ca.vertcat(first, second), ca.vertcat(v, c)))
 
 
-def _solver(seen: ca.SX) -> Callable[[ca.SX], ca.SX]:
+def dependent_solver(seen: ca.SX) -> Callable[[ca.SX], ca.SX]:
     """b -> (J J')^-1 b, of rows that depend on each other bounded."""
     gram = seen @ seen.T
     gram += REGULAR**2 * ca.trace(gram) / gram.shape[0] * ca.SX.eye(gram.shape[0])

@@ -44,9 +44,9 @@ def test_joints_that_push_each_other_to_their_limits_brake_in_time() -> None:
         q, v = pin.integrate(robot.model, q, step.v * DT), np.array(step.v)
 
 
-#: Linkages of several motions with a joint that has just left its limit: seed, configuration, velocity, and posture that
-#: is wanted. Where what it does next was taken for what it did, two ticks later several joints had to turn round within
-#: the tick, each by what it alone could brake by, and no motion did
+#: Linkages of several motions with a joint that has just left its limit: seed, configuration, velocity, and posture
+#: that is wanted. Where what it does next was taken for what it did, two ticks later several joints had to turn round
+#: within the tick, each by what it alone could brake by, and no motion did
 LEAVING = (
     (
         135,
@@ -159,13 +159,14 @@ def test_the_row_of_a_joint_says_where_it_stops(seed: int, later: bool) -> None:
         about = min(max(about, speed - reach), speed + reach)
         there = v / speed * about
 
-        def stop(velocity: Array, k: int = k, moves: bool = toward > 0.0, bends: float = bends) -> float:
-            """Where it stops if it bends as at v, but for its speed."""
-            time = 0.5 * size(velocity) / STOP
-            away = 0.0 if moves else velocity[k] * (0.5 * about / STOP - time)
-            return float(begins[k] + velocity[k] * (DT + time) + away + 0.5 * (size(velocity) / speed * time) ** 2 * bends)
-
         time = DT + 0.5 * about / STOP
+
+        def stop(velocity: Array, k: int = k, leaves: float = time * (toward == 0.0), bends: float = bends) -> float:
+            """Where it stops if it bends as at v, but for its speed; what leaves the limit may be back after a time."""
+            stops = 0.5 * size(velocity) / STOP
+            bent = 0.5 * (size(velocity) / speed * stops) ** 2 * bends
+            return float(begins[k] + velocity[k] * (leaves or DT + stops) + bent)
+
         assert matrix[first + k] @ there - row[first + k, 0] == pytest.approx((stop(there) - end) / time, abs=1e-9)
         slopes = [(stop(there + h * unit) - stop(there - h * unit)) / (2.0 * h) for unit in np.eye(robot.nv)]
         assert matrix[first + k] == pytest.approx(np.array(slopes) / time, abs=1e-6)
