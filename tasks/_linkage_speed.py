@@ -77,8 +77,9 @@ class LinkageSpeed(Constraint):
     The row of a joint is the line over dt + t, with s and c t^2 to first order about the speed along v0 at which the
     joint comes to its limit but for c, of those that A lets it reach; no row asks for more than braking by D does, or
     by what of it bends leave within A. A linkage of one motion turns back no faster than it stops before the limit
-    behind. Where accelerations are commanded a tick moves by (v0 + v) dt / 2, and q + v0 dt / 2 is in place of q: what
-    brakes then stays within the line as before.
+    behind. One of several may turn: of its joints the limit is that next to which they stop, c counts only towards it,
+    and what leaves it may come back within t at s. Where accelerations are commanded a tick moves by (v0 + v) dt / 2,
+    and q + v0 dt / 2 is in place of q: what brakes then stays within the line as before.
 
     Attributes:
         limits: whose limits they are.
@@ -159,11 +160,15 @@ class LinkageSpeed(Constraint):
             place, v_joint = dofs.index(dof), kin.v[dof]
             begins = kin.q[int(robot.position_index[dof])] + moved * dt * v_joint
             up, down = float(kept.position_upper[dof]) - begins, begins - float(kept.position_lower[dof])
-            ahead_is_up, share = v_joint > 0.0, ca.fabs(v_joint) / speed + LEAST
+            ahead_is_up = 2.0 * v_joint * (dt + 0.5 / STOP * speed) > up - down if _turns(linkage) else v_joint > 0.0
+            toward = ca.if_else(ahead_is_up, ca.fmax(v_joint, 0.0), ca.fmin(v_joint, 0.0))
+            share = ca.fabs(toward) / speed + LEAST
             about = _stopping(ca.if_else(ahead_is_up, up, down), share, dt)
             about = ca.fmax(ca.fmin(ca.fmax(about, speed - reach), speed + reach), 0.0)
             stops, bent = 0.5 / STOP * about, asked[place] * (about / speed) ** 2
-            row = (0.5 / STOP * v_joint / speed * about + bent * stops / STOP) * along
+            if _turns(linkage):
+                bent = ca.if_else(ahead_is_up, ca.fmax(bent, 0.0), ca.fmin(bent, 0.0))
+            row = (0.5 / STOP * toward / speed * about + bent * stops / STOP) * along
             ahead = about / speed * ca.dot(row, kin.v[dofs]) - 0.5 * bent * stops**2 - begins
             row[place] += dt + stops
             row, ahead = row / (dt + stops), ahead / (dt + stops)
@@ -215,7 +220,7 @@ def bend_of(robot: Robot, kin: Tracer, linkage: Linkage, limits: Array) -> Bend:
     bias = kin.second(error, MotionExpressions(kin.kinematics))[1][rows]
     jacobian = ca.densify(kin.jacobian(error))[rows, dofs]
     seen = jacobian @ ca.diag(weights)
-    solve = _solver(seen)
+    solve = dependent_solver(seen)
     forces = solve(bias)
     weak = solve(forces)
     asked, other = (-weights * (seen.T @ each) for each in (forces, weak))
@@ -268,7 +273,7 @@ def _bracket(q: ca.SX, tangent: ca.SX, v: ca.SX, c: ca.SX) -> ca.SX:
     return ca.densify(ca.substitute(out, ca.vertcat(first, second), ca.vertcat(v, c)))
 
 
-def _solver(seen: ca.SX) -> Callable[[ca.SX], ca.SX]:
+def dependent_solver(seen: ca.SX) -> Callable[[ca.SX], ca.SX]:
     """b -> (J J')^-1 b, of rows that depend on each other bounded."""
     gram = seen @ seen.T
     gram += REGULAR**2 * ca.trace(gram) / gram.shape[0] * ca.SX.eye(gram.shape[0])

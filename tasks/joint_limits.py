@@ -63,8 +63,8 @@ class JointLimits(Constraint):
 
     What it cannot do: keep the limit when v0 is not the velocity that the joint has, or when the robot starts too fast
     too close to it. The promise ``shortest_dt`` is not checked. Floating and planar bases, ball and unbounded joints
-    have no position limit. Whether the motors have the torque for A is considered on a floating base with
-    ``TorqueLimits`` only.
+    have no position limit. Whether the motors have the torque for A is considered on a floating base, and
+    in loops without A, with ``TorqueLimits`` only.
 
     Example:
         >>> import wbc

@@ -44,6 +44,46 @@ def test_joints_that_push_each_other_to_their_limits_brake_in_time() -> None:
         q, v = pin.integrate(robot.model, q, step.v * DT), np.array(step.v)
 
 
+#: Linkages of several motions with a joint that has just left its limit: seed, configuration, velocity, and posture
+#: that is wanted. Where what it does next was taken for what it did, two ticks later several joints had to turn round
+#: within the tick, each by what it alone could brake by, and no motion did
+LEAVING = (
+    (
+        135,
+        (-0.119290385, -0.548131081, 0.614108181, 0.087063418, -0.942988309, -0.969471861, 0.305095947, -0.999999269),
+        (-0.114560324, 0.541215224, -0.287778893, -0.462943134, 0.965766981, -0.145713465, -1.002457039, -0.000801238),
+        (2.709037, -0.580707, -1.945973, -1.352604, -0.57879, -1.368106, -0.780116, -0.765341),
+    ),
+    (
+        135,
+        (-0.196061609, -0.616992102, 0.859742789, -0.043039693, -0.884550316, -0.999999164, 0.244219253, -0.954707779),
+        (-0.133573989, -0.545928513, 0.864970133, 0.021802251, -0.458730835, 3.9866e-05, 0.526348812, 0.156992823),
+        (-1.248764, -0.651592, 1.871732, 0.870673, 0.433662, -3.161901, 2.069822, 4.719856),
+    ),
+    (
+        137,
+        (-0.999660334, -0.999999033, -0.555813836, 0.900679299, -0.270081163, -0.488274445),
+        (-0.005253871, -0.000358874, -1.31450352, 0.726639622, -0.370624408, 0.003481577),
+        (1.586216, -2.436987, -4.738324, -0.194029, -1.261313, 2.756428),
+    ),
+)
+
+
+@pytest.mark.parametrize(("seed", "begins", "rates", "wanted"), LEAVING)
+def test_a_joint_that_leaves_its_limit_comes_back_no_faster_than_it_stops(
+    seed: int, begins: Array, rates: Array, wanted: Array
+) -> None:
+    robot = limited(seed).with_limits(acceleration=20.0)
+    stack = wbc.Stack(robot, 2.0 * DT).add(wbc.tasks.Posture(), name="posture").add(wbc.tasks.JointLimits())
+    controller, q, v = stack.compile(command="acceleration", backend="vm"), robot.closed(begins), np.array(rates)
+    controller.reset(q)
+    controller["posture"].target = wanted
+    for k in range(4):
+        step = controller.step(q, v)
+        assert step.status == "solved", (k, step)
+        q, v = np.array(step.q_next), np.array(step.v)
+
+
 @pytest.mark.parametrize("seed", [42, 53, 69])
 def test_a_joint_that_has_no_more_to_brake_by_gives_way_to_no_rounding(seed: int) -> None:
     """The bend takes 0.95 of the limits, the row asks for the rest, and the loop is open by 1e-10."""
@@ -105,24 +145,30 @@ def test_the_row_of_a_joint_says_where_it_stops(seed: int, later: bool) -> None:
     matrix, lower, upper, bent = (np.array(part) for part in look(q, v))
     speed, begins, reach = size(v), q + (0.5 * DT * v if later else 0.0), robot.nv**0.25 * DT
 
-    def stop(velocity: Array) -> tuple[Array, float]:
-        """Where joints stop whose bend is that of v, but for its speed, and the time that they count on."""
-        time = DT + 0.5 * size(velocity) / STOP
-        share = (size(velocity) / speed) ** 2
-        return begins + velocity * time + 0.5 * share * bent.ravel() * (time - DT) ** 2, time
-
     kept, h = robot.limits, 1e-6
     first = len(matrix) - robot.nv
     for k in range(robot.nv):
-        end, row = (kept.position_upper[k], upper) if v[k] > 0.0 else (kept.position_lower[k], lower)
+        # The end next to which it stops, from which it may move off; bends are not counted on to turn it round
+        middle = 0.5 * (kept.position_lower[k] + kept.position_upper[k])
+        sign = 1.0 if begins[k] + v[k] * (DT + 0.5 * speed / STOP) > middle else -1.0
+        end, row = (kept.position_upper[k], upper) if sign > 0.0 else (kept.position_lower[k], lower)
+        toward, bends = max(sign * v[k], 0.0), sign * max(sign * bent[k, 0], 0.0)
         # The speed at which it would stop at its limit but for the bend, of those that it may reach
-        about = STOP * (np.sqrt(DT**2 + 2.0 * abs(end - begins[k]) * speed / abs(v[k]) / STOP) - DT)
-        there = v / speed * min(max(about, speed - reach), speed + reach)
-        reached, time = stop(there)
-        assert matrix[first + k] @ there - row[first + k, 0] == pytest.approx((reached[k] - end) / time, abs=1e-9)
-        slopes = [
-            (stop(there + h * unit)[0][k] - stop(there - h * unit)[0][k]) / (2.0 * h) for unit in np.eye(robot.nv)
-        ]
+        room = max(2.0 * sign * (end - begins[k]), 0.0)
+        about = STOP * (np.sqrt(DT**2 + room / (toward / speed + 1e-12) / STOP) - DT)
+        about = min(max(about, speed - reach), speed + reach)
+        there = v / speed * about
+
+        time = DT + 0.5 * about / STOP
+
+        def stop(velocity: Array, k: int = k, leaves: float = time * (toward == 0.0), bends: float = bends) -> float:
+            """Where it stops if it bends as at v, but for its speed; what leaves the limit may be back after a time."""
+            stops = 0.5 * size(velocity) / STOP
+            bent = 0.5 * (size(velocity) / speed * stops) ** 2 * bends
+            return float(begins[k] + velocity[k] * (leaves or DT + stops) + bent)
+
+        assert matrix[first + k] @ there - row[first + k, 0] == pytest.approx((stop(there) - end) / time, abs=1e-9)
+        slopes = [(stop(there + h * unit) - stop(there - h * unit)) / (2.0 * h) for unit in np.eye(robot.nv)]
         assert matrix[first + k] == pytest.approx(np.array(slopes) / time, abs=1e-6)
 
 

@@ -22,6 +22,7 @@ import numpy as np
 
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import CLOSED, Block, Layout, Slot
+from wbc.stack.motors import decelerations
 from wbc.symbolic.kinematics import Kinematics, Pose
 from wbc.symbolic.motion import MotionExpressions
 from wbc.symbolic.tracer import Tracer, along
@@ -35,8 +36,6 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
 
-#: Part of a motor's torque that braking counts on where forces of motion and weight take more of it
-LEAST_SHARE = 0.1
 #: How fast loops that are open close, critically damped [1 per tick]
 LOOP_RATE = 0.2
 #: and at most [characteristic lengths or rad per second]
@@ -165,7 +164,7 @@ class SecondOrder:
         b, v = self._b, self._kinematics.v
         longest = b.stack.dt_range[1]
         bounds = item.acceleration_bounds(
-            self._robot, Tracer(self._kinematics), b.values(block), b.dt, longest, self._motors
+            self._robot, Tracer(self._kinematics), b.values(block), b.dt, longest, self._motors_of(item)
         )
         assert bounds is not None
         ends = [b.column(block, "lower", bounds.lower), b.column(block, "upper", bounds.upper)]
@@ -175,21 +174,24 @@ class SecondOrder:
             ends[1][i] = ca.if_else(v[i] > most[i], ca.fmin(ends[1][i], back), ends[1][i])
         return Rows(self._wide(ca.SX.eye(self._layout.nv)), *ends)
 
+    def _motors_of(self, item: Constraint) -> dict[int, ca.SX]:
+        """What the motors of joints have, but of linkages with limits of acceleration: these have rows of their own."""
+        limits, linkages = item.acceleration_limits(self._robot), self._robot.loops.linkages
+        slowed = {dof for part in linkages if np.isfinite(limits[list(part.dofs)]).any() for dof in part.dofs}
+        return {dof: motor for dof, motor in self._motors.items() if dof not in slowed}
+
     @cached_property
     def _motors(self) -> dict[int, ca.SX]:
-        """Decelerations that motors with limits T have for all that their joint carries, (T - |h|) / M, by degree of
-        freedom; h and M of a leader with its followers'.
-        """
-        out: dict[int, ca.SX] = {}
-        inertia = ca.diag(self._driven @ self._motion.dynamics.mass_matrix @ self._driven.T)
+        """Decelerations that motors with limits have, by degree of freedom."""
+        limits: dict[int, ca.SX] = {}
         for block in self._layout.of_form("rows"):
             item = block.entry.item
             for i in item.dofs(self._robot) if isinstance(item, TorqueLimits) else ():
                 scale = self._b.values(block)["scale"]
                 assert isinstance(scale, ca.SX)
-                most = scale * float(self._robot.limits.effort[i])
-                out[i] = ca.fmax(most - ca.fabs(self._still[i]), LEAST_SHARE * most) / inertia[i]
-        return out
+                limits[i] = scale * float(self._robot.limits.effort[i])
+        mass = self._driven @ self._motion.dynamics.mass_matrix @ self._driven.T
+        return decelerations(self._robot, self._kinematics, mass, self._still, limits)
 
     def _later(self, block: Block, declared: Rows, tracer: Tracer) -> Rows:
         """Rows on the velocity at the end of the tick, v + a dt."""
