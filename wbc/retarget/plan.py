@@ -73,6 +73,7 @@ class Planner:
         self._own = own = [body.limbs[name] for name in limbs]
         self._feet = [k for k, name in enumerate(limbs) if body.is_foot(name)]
         self.flat = [k for k in self._feet if own[k].contact == "flat"]
+        self._hulls = [float(np.linalg.norm(limb.surface, axis=1).max(initial=limb.radius)) for limb in own]
         self._soles = {k: np.ascontiguousarray(own[k].surface.T) for k in self.flat}
         #: lengths of two bones and way of the bend, and heights of ankles above soles, 0 of points, of limbs
         self._bones = np.array([(*limb.lengths, limb.bend) for limb in own])
@@ -158,7 +159,7 @@ class Planner:
                         rotation[span] = turned_toward(heading, path[span], share)
             before = max(a - round(BEFORE / dt), free[0])
             held[before:a] = True
-            targets.lies[before:b, limb] = hand and bool(place[2] <= self._own[limb].radius)
+            targets.lies[before:b, limb] = hand and bool(place[2] <= self._hulls[limb])
         targets.chains[:, limb, 3] = end
         if len(rotation):
             targets.turns[name] = rotation
@@ -197,14 +198,14 @@ class Planner:
         left, _, right = np.linalg.svd(rotation.mean(axis=0))
         standing = left @ right
         level = _grounded(_median(self._lowest(limb, chain[:, 3], rotation)))
-        for _ in range(TURNED):
+        for turns_left in reversed(range(TURNED + 1)):
             # The lowest point of the sole stands where it is in the mean
             lowest = robot.surface[int(np.argmin(robot.surface @ standing[2]))]
             place = _median(chain[:, 3] + rotation @ lowest) - standing @ lowest
             place[2] = level - float(standing[2] @ lowest)
             turns = self._standing_turns(targets, limb, ticks, place, standing)
             most = float(turns[np.argmax(np.abs(turns))])
-            if abs(most) < LEAST_TURN:
+            if abs(most) < LEAST_TURN or not turns_left:
                 break
             standing = standing @ _pitched(np.array([most]))[0]
         return place, standing
