@@ -125,6 +125,7 @@ class LiveRetargeter:
             turns = np.concatenate([targets.turns[planner.limbs[limb]] for limb in feet])
             turns = turned_toward(self._headings[feet], turns, paths[feet])
             targets.turns.update((planner.limbs[limb], turn[None]) for limb, turn in zip(feet, turns, strict=True))
+            planner.keep_above(targets, [limb for limb in feet if paths[limb] > 0.0])
         targets.held[0] = targets.stands[0] = self._stands & (self._shares * BLEND <= BEFORE)
         targets.lies[0] = self._hands & (self._places[:, 2] <= self._radii)
 

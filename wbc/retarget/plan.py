@@ -92,6 +92,7 @@ class Planner:
         ends = self.raised(ticks)
         for limb in range(len(self.limbs)):
             self._stand(ticks, limb, ends[:, limb])
+        self.keep_above(ticks, self.flat)
         ankles = self.ankles(ticks)
         self.lower(ticks, self.lowering(ticks, ankles), ankles)
         return ticks
@@ -172,6 +173,12 @@ class Planner:
             lowest[:, limb] = self._lowest(limb, ends[:, limb], targets.turns[self.limbs[limb]])
         ends[:, :, 2] += lift(lowest)
         return ends
+
+    def keep_above(self, targets: Targets, feet: Sequence[int]) -> None:
+        """Raise flat feet whose lowest point is below the ground as they come to their stances or leave them."""
+        for limb in feet:
+            low = self._lowest(limb, targets.chains[:, limb, 3], targets.turns[self.limbs[limb]])
+            targets.chains[:, limb, 3, 2] -= np.minimum(low, 0.0)
 
     def _lowest(self, limb: int, end: Array, rotation: Array) -> Array:
         """Height of the lowest point of a flat foot [ticks] [m]."""
