@@ -19,7 +19,7 @@ CONJUGATE = np.array([-1.0, -1.0, -1.0, 1.0])
 
 def exponential(turns: Array) -> Array:
     """Rotation matrices of rotation vectors, m x 3 [rad]: 1 + sin(t) K + (1 - cos(t)) K^2, by Rodrigues."""
-    angles = np.linalg.norm(turns, axis=1)
+    angles = np.sqrt(np.vecdot(turns, turns))
     axes = turns / np.where(angles > 0.0, angles, 1.0)[:, None]
     x, y, z = axes.T
     cross = np.zeros((len(turns), 3, 3))

@@ -550,6 +550,25 @@ def crawl(seed: int = 0, rate: float = 60.0) -> Made:
     return person.made("crawl", rate, stances)
 
 
+def push_ups(seed: int = 0, rate: float = 60.0) -> Made:
+    """Two push-ups on hands and toes, which all stand all the time."""
+    random = np.random.default_rng(seed)
+    size, t = random.uniform(0.9, 1.12), np.arange(round(5.0 * rate) + 1) / rate
+    person, pitch = Person(size, t), 0.9
+    down = random.uniform(0.05, 0.08) * np.sin(2.0 * np.pi * np.clip((t - 0.5) / 4.0, 0.0, 1.0)) ** 2
+    pelvis = np.stack((0.0 * t, 0.0 * t, size * (0.42 - down)), axis=1)
+    person.trunk(pelvis, turned(1, 1.35 + 0.0 * t), 0.05 + 0.0 * t, -0.6 + 0.0 * t)
+    height = size * (0.02 + 0.13 * np.sin(pitch) + (ANKLE - 0.02) * np.cos(pitch))
+    stances = {}
+    for side, sign in (("Left", 1.0), ("Right", -1.0)):
+        stances[f"{side}Foot"] = (Stance(-1e3, 1e3, (-0.72 * size, sign * 0.09 * size, height, 0.0)),)
+        stances[f"{side}Hand"] = (Stance(-1e3, 1e3, (0.48 * size, sign * 0.20 * size, 0.03 * size, 0.0)),)
+        foot, hand = (Limbs(0.0, 0.0).over(t, stances[f"{side}{end}"]) for end in ("Foot", "Hand"))
+        person.leg(side, foot[0], foot[1], pitch + 0.0 * t, -pitch)
+        person.reach(side, hand[0], hand[1])
+    return person.made("push_ups", rate, stances)
+
+
 def dance(seed: int = 0, rate: float = 60.0) -> Made:
     """Steps in random directions and turns on a beat, with trunk, arms and head moving."""
     random = np.random.default_rng(seed)

@@ -75,3 +75,17 @@ def test_ticks_of_a_plan_are_those_of_one_at_a_time() -> None:
         made._ticks._group.write(row)
         v = made.controller.step(before).v
         assert np.abs(pin.integrate(made.robot.model, before, v * made.dt) - after).max() < 1e-9
+
+
+@pytest.mark.parametrize("robot", ["romeo_laas_small", "g1"])
+def test_links_of_who_is_on_hands_and_toes_stay_above_ground(robot: str) -> None:
+    """Feet on their toes as they stand and leave, and hands whose hulls reach below their balls."""
+    made = Retargeter(robot)
+    for clip, end, noise in ((clips.crawl(), 1.7, 0.0), (clips.crawl(), 1.0, 0.003), (clips.push_ups(), 1.0, 0.003)):
+        motion = made.run(motions.part(clips.noisy(clip.clip, 0, noise), 0.0, end))
+        for name in ("left_leg", "right_leg"):
+            place = motion.plan.chains[:, motion.plan.limbs.index(name), 3]
+            heights = motion.plan.turns[name][:, 2] @ motion.body.limbs[name].surface.T + place[:, 2, None]
+            assert heights.min() > -1e-9
+        assert motion.errors.figures["penetration"] < 1e-3
+        assert motion.errors.figures["slide"] < 1e-6

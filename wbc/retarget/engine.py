@@ -272,7 +272,7 @@ class Engine:
         places, level = targets.places, np.zeros((len(targets.pelvis), 3, 3)) + np.eye(3)
         if self._balances:
             places = np.concatenate([places, balanced(targets)[:, None]], axis=1)
-        return places, np.stack([targets.turns.get(name, level) for name in self._turns], axis=1)
+        return places, np.array([targets.turns.get(name, level) for name in self._turns]).swapaxes(0, 1)
 
     def rows(self, places: Array, turns: Array) -> Array:
         """Numbers of all inputs over ticks [ticks, numbers], of :meth:`table`."""

@@ -48,7 +48,10 @@ class LiveRetargeter:
         self._hands = np.array([not match.body.is_foot(name) for name in limbs])
         self._radii = np.array([match.body.limbs[name].radius for name in limbs])
         legs = [one for one in leads if one.source.endswith("leg")] or leads
-        self._leg = float(np.mean([np.linalg.norm(rest[one.base] - rest[one.end]) for one in legs]))
+        leg = float(np.mean([np.linalg.norm(rest[one.base] - rest[one.end]) for one in legs]))
+        #: speeds below which limbs come to stand and above which they go off, and how far from the ground they stand
+        self._slowest, self._fastest = SLOW * leg, FAST * leg
+        self._levels = np.where(self._of_legs, LEVEL, HAND_HEIGHT) * leg
         self.reset()
 
     def reset(self) -> None:
@@ -85,8 +88,9 @@ class LiveRetargeter:
         self._planner.turn_ankles(targets)
         if self._match.body.robot.base != "fixed":
             self._stand(targets)
-            self._low = max(float(self._planner.lowering(targets)[0]), self._low - RISE / self.rate)
-            self._planner.lower(targets, np.array([self._low]))
+            ankles = self._planner.ankles(targets)
+            self._low = max(float(self._planner.lowering(targets, ankles)[0]), self._low - RISE / self.rate)
+            self._planner.lower(targets, np.array([self._low]), ankles)
         now, held = self._engine.table(targets), targets.grips(0)
         if self._last is None or self.q is None:
             self.q = self._engine.start(*now, held)
@@ -98,13 +102,13 @@ class LiveRetargeter:
     def _look(self, ends: Array) -> None:
         """Which limbs stand, as far as the frames so far say, of their ends and tips [limbs, 2, 3] [m]."""
         if self._last is not None:
-            speeds = np.sqrt(((ends - self._before) ** 2).sum(axis=2).max(axis=1)) * self.rate
+            moved = ends - self._before
+            speeds = np.sqrt(np.vecdot(moved, moved).max(axis=1)) * self.rate
             self._speeds += (1.0 - np.exp(-1.0 / (FILTER * self.rate))) * (speeds - self._speeds)
         self._before, low = ends, ends[:, :, 2].min(axis=1)
-        self._slow = self._speeds < np.where(self._slow, FAST, SLOW) * self._leg
+        self._slow = self._speeds < np.where(self._slow, self._fastest, self._slowest)
         self._lowest = np.minimum(self._lowest, ends[:, 0, 2])
-        near = low[self._of_legs].min(initial=np.inf) + np.where(self._of_legs, LEVEL, HAND_HEIGHT) * self._leg
-        self._stands = self._slow & (low < near)
+        self._stands = self._slow & (low < low[self._of_legs].min(initial=np.inf) + self._levels)
 
     def _stand(self, targets: Targets) -> None:
         """Targets of limbs in this frame: where they stand, or on their way there or from there."""
@@ -121,6 +125,7 @@ class LiveRetargeter:
             turns = np.concatenate([targets.turns[planner.limbs[limb]] for limb in feet])
             turns = turned_toward(self._headings[feet], turns, paths[feet])
             targets.turns.update((planner.limbs[limb], turn[None]) for limb, turn in zip(feet, turns, strict=True))
+            planner.keep_above(targets, [limb for limb in feet if paths[limb] > 0.0])
         targets.held[0] = targets.stands[0] = self._stands & (self._shares * BLEND <= BEFORE)
         targets.lies[0] = self._hands & (self._places[:, 2] <= self._radii)
 

@@ -27,7 +27,7 @@ STEEP = 0.9
 
 def normalised(vectors: Array, fallback: Array) -> Array:
     """Unit vectors; where one has no length, the fallback."""
-    sizes = np.sqrt(np.einsum("...i,...i->...", vectors, vectors))[..., None]
+    sizes = np.sqrt(np.vecdot(vectors, vectors))[..., None]
     return np.asarray(np.where(sizes > SHORT, vectors / np.maximum(sizes, 1e-12), fallback))
 
 
@@ -78,6 +78,7 @@ class Mapper:
         self._ground = np.where(lies[:, None], self._thick, NO_GROUND)
         #: height of the robot's ankle, or of the centre of a point foot, above the ground that it stands on [m]
         self._heights = np.array([self._height(name) for name in self.limbs])
+        self._hip_height = self._height("left_leg") if "left_leg" in body.limbs else 0.0
         #: points of all limbs, from base to tip; directions of their bones at rest, where one has no length
         self._chains = np.array([one.chain for one in self._leads])
         bones = np.diff(rest[self._chains], axis=1)
@@ -113,7 +114,7 @@ class Mapper:
             pelvis, chest = (turn @ rest[0].T @ axes for turn, rest in now)
         if match.all_fours and match.upright and not body.plan.upright:
             pelvis, chest = pelvis @ LYING_TRUNK, chest @ LYING_TRUNK
-        hips = points[:, self._hips].mean(axis=1)
+        hips = 0.5 * (points[:, self._hips[0]] + points[:, self._hips[1]])
         if body.robot.base == "fixed":
             # The robot's trunk stands where it stands: arms move as seen from the pelvis
             mirror = np.array([-1.0 if match.mirrored else 1.0, 1.0, 1.0])
@@ -125,8 +126,9 @@ class Mapper:
         else:
             ground = min((ankle[match.limbs[name].source] for name in self.limbs if name.endswith("leg")), default=0.0)
             place = match.scale * (hips - np.array([0.0, 0.0, ground]))
-            place[:, 2] += self._height("left_leg") if "left_leg" in body.limbs else 0.0
-        bones = normalised(np.diff(points[:, self._chains], axis=2), self._still)
+            place[:, 2] += self._hip_height
+        joints = points[:, self._chains]
+        bones = normalised(joints[:, :, 1:] - joints[:, :, :-1], self._still)
         bases = place[:, None] + self._bases @ np.swapaxes(pelvis, 1, 2)
         above = (place + pelvis @ self._waist)[:, None] + self._bases @ np.swapaxes(chest, 1, 2)
         bases = np.where(self._from_chest, above, bases)
@@ -140,8 +142,8 @@ class Mapper:
         chains, headings = np.empty((count, len(self.limbs), 4, 3)), _headings(pelvis)
         chains[:, :, 0] = bases
         for k in range(3):
-            step = self._lengths[:, k, None] * bones[:, :, k]
-            chains[:, :, k + 1] = _next_joint(chains[:, :, k], step, self._ground[:, k], headings)
+            lengths = self._lengths[:, k]
+            chains[:, :, k + 1] = _next_joint(chains[:, :, k], bones[:, :, k], lengths, self._ground[:, k], headings)
         known = {"pelvis": pelvis, "chest": chest}
         if turns is not None and match.head >= 0 and body.head:
             known["head"] = turns[:, match.head] @ axes
@@ -170,22 +172,24 @@ class Mapper:
         forward = rest[lead.tip] - rest[lead.end]
         before = frames_of(axes[:, 1][None], np.cross(forward, axes[:, 1])[None])[0]
         ahead, left = points[:, lead.tip] - points[:, lead.end], pelvis[:, :, 1]
-        side = left - ahead * (np.sum(left * ahead, axis=1) / np.maximum(np.sum(ahead**2, axis=1), 1e-12))[:, None]
+        side = left - ahead * (np.vecdot(left, ahead) / np.maximum(np.vecdot(ahead, ahead), 1e-12))[:, None]
         return np.asarray(frames_of(side, np.cross(ahead, side)) @ before.T @ axes)
 
 
-def _next_joint(start: Array, bones: Array, ground: Array, headings: Array) -> Array:
-    """Where bones [frames, limbs, 3] [m] end; those that would end below heights of theirs [limbs] [m] are turned."""
+def _next_joint(start: Array, ways: Array, lengths: Array, ground: Array, headings: Array) -> Array:
+    """Where bones along ways [frames, limbs, 3] of lengths [limbs] [m] end; those that would end below heights of
+    theirs [limbs] [m] are turned.
+    """
+    bones = lengths[:, None] * ways
     end: Array = start + bones
     heights = end[..., 2] - ground
     if not (heights < FAR_ABOVE * CLEAR).any():
         return end
-    lengths = np.sqrt((bones * bones).sum(axis=2))
     rise = np.minimum(np.maximum(bones[..., 2] + lift(heights), -lengths), lengths)
     # The bone goes out level as far as its length says, ahead where it stood upright
-    way = bones[..., :2] + AHEAD_SHARE * lengths[..., None] * headings[:, None, :2, 0]
-    way /= np.maximum(np.sqrt((way * way).sum(axis=2, keepdims=True)), SHORT)
-    along, more = np.abs((bones[..., :2] * way).sum(axis=2)), bones[..., 2] ** 2 - rise**2
+    way = bones[..., :2] + AHEAD_SHARE * lengths[:, None] * headings[:, None, :2, 0]
+    way /= np.maximum(np.sqrt(np.vecdot(way, way)), SHORT)[..., None]
+    along, more = np.abs(np.vecdot(bones[..., :2], way)), bones[..., 2] ** 2 - rise**2
     out = more / np.maximum(along + np.sqrt(np.maximum(along**2 + more, 0.0)), SHORT)
     end[..., :2] += out[..., None] * way
     end[..., 2] = start[..., 2] + rise

@@ -44,14 +44,13 @@ BEFORE = 0.05
 
 def logarithms(rotations: Array) -> Array:
     """Rotation vectors [n, 3] of rotations [n, 3, 3]."""
-    cosines = 0.5 * (np.trace(rotations, axis1=1, axis2=2) - 1.0)
+    cosines = 0.5 * (rotations[:, 0, 0] + rotations[:, 1, 1] + rotations[:, 2, 2] - 1.0)
     if (cosines < NEARLY_TURNED).any():
         from scipy.spatial.transform import Rotation
 
         return np.asarray(Rotation.from_matrix(rotations).as_rotvec())
-    skew = 0.5 * (rotations - np.swapaxes(rotations, 1, 2))
-    axes = np.stack([skew[:, 2, 1], skew[:, 0, 2], skew[:, 1, 0]], axis=1)
-    sines = np.sqrt(np.sum(axes**2, axis=1))
+    axes = 0.5 * (rotations[:, (2, 0, 1), (1, 2, 0)] - rotations[:, (1, 2, 0), (2, 0, 1)])
+    sines = np.sqrt(np.vecdot(axes, axes))
     return np.asarray(axes * (np.arctan2(sines, cosines) / np.maximum(sines, 1e-12))[:, None])
 
 
@@ -74,6 +73,8 @@ class Planner:
         self._own = own = [body.limbs[name] for name in limbs]
         self._feet = [k for k, name in enumerate(limbs) if body.is_foot(name)]
         self.flat = [k for k in self._feet if own[k].contact == "flat"]
+        self._hulls = [float(np.linalg.norm(limb.surface, axis=1).max(initial=limb.radius)) for limb in own]
+        self._soles = {k: np.ascontiguousarray(own[k].surface.T) for k in self.flat}
         #: lengths of two bones and way of the bend, and heights of ankles above soles, 0 of points, of limbs
         self._bones = np.array([(*limb.lengths, limb.bend) for limb in own])
         self._ankle = np.array([limb.ankle if k in self.flat else 0.0 for k, limb in enumerate(own)])
@@ -91,14 +92,17 @@ class Planner:
         ends = self.raised(ticks)
         for limb in range(len(self.limbs)):
             self._stand(ticks, limb, ends[:, limb])
-        self.lower(ticks, self.lowering(ticks))
+        self.keep_above(ticks, self.flat)
+        ankles = self.ankles(ticks)
+        self.lower(ticks, self.lowering(ticks, ankles), ankles)
         return ticks
 
     def turn_ankles(self, targets: Targets) -> None:
         """Turn flat feet about their axes to the left as far as their ankles need it."""
         if self.flat:
-            hips, towards, ankles, _ = np.moveaxis(targets.chains[:, self.flat], 2, 0)
-            rotations = np.stack([targets.turns[self.limbs[k]] for k in self.flat], axis=1)
+            chains = targets.chains[:, self.flat]
+            hips, towards, ankles = chains[:, :, 0], chains[:, :, 1], chains[:, :, 2]
+            rotations = np.array([targets.turns[self.limbs[k]] for k in self.flat]).swapaxes(0, 1)
             shanks = self.knees(self.flat, hips, towards, ankles, targets.turns["pelvis"]) - ankles
             turns = self._ankle_turns(self.flat, rotations, shanks)
             for number, limb in enumerate(self.flat):
@@ -118,11 +122,11 @@ class Planner:
         """
         upper, lower, bend = self._bones[legs].T[:, :, None]
         way = ankles - hips
-        distance = np.maximum(np.sqrt((way * way).sum(axis=2, keepdims=True)), SHORT)
+        distance = np.maximum(np.sqrt(np.vecdot(way, way)), SHORT)[..., None]
         way = way / distance
         side = towards - hips + AHEAD_SHARE * upper * pelvis[:, None, :, 0]
-        side = side - (side * way).sum(axis=2, keepdims=True) * way
-        size = np.maximum(np.sqrt((side * side).sum(axis=2, keepdims=True)), SHORT)
+        side = side - np.vecdot(side, way)[..., None] * way
+        size = np.maximum(np.sqrt(np.vecdot(side, side)), SHORT)[..., None]
         along = np.minimum(np.maximum((upper**2 + distance**2 - lower**2) / (2.0 * distance), -upper), upper)
         return np.asarray(hips + along * way + bend * np.sqrt(upper**2 - along**2) / size * side)
 
@@ -156,7 +160,7 @@ class Planner:
                         rotation[span] = turned_toward(heading, path[span], share)
             before = max(a - round(BEFORE / dt), free[0])
             held[before:a] = True
-            targets.lies[before:b, limb] = hand and bool(place[2] <= self._own[limb].radius)
+            targets.lies[before:b, limb] = hand and bool(place[2] <= self._hulls[limb])
         targets.chains[:, limb, 3] = end
         if len(rotation):
             targets.turns[name] = rotation
@@ -170,10 +174,16 @@ class Planner:
         ends[:, :, 2] += lift(lowest)
         return ends
 
+    def keep_above(self, targets: Targets, feet: Sequence[int]) -> None:
+        """Raise flat feet whose lowest point is below the ground as they come to their stances or leave them."""
+        for limb in feet:
+            low = self._lowest(limb, targets.chains[:, limb, 3], targets.turns[self.limbs[limb]])
+            targets.chains[:, limb, 3, 2] -= np.minimum(low, 0.0)
+
     def _lowest(self, limb: int, end: Array, rotation: Array) -> Array:
         """Height of the lowest point of a flat foot [ticks] [m]."""
         # A product a tick: one of all would start threads
-        heights = rotation[:, 2, None] @ np.ascontiguousarray(self._own[limb].surface.T)
+        heights = rotation[:, 2, None] @ self._soles[limb]
         return np.asarray(heights.min(axis=2)[:, 0] + end[:, 2])
 
     def standing_place(self, targets: Targets, limb: int, ticks: slice) -> tuple[Array, Array | None]:
@@ -184,24 +194,25 @@ class Planner:
             place[2] = robot.radius + _grounded(place[2] - robot.radius)
             return place, None
         rotation = targets.turns[self.limbs[limb]][ticks]
-        forward = rotation[:, :, 0].mean(axis=0)
-        standing = exponential(np.array([[0.0, 0.0, float(np.arctan2(forward[1], forward[0]))]]))[0]
-        place[2] = _grounded(_median(chain[:, 2, 2]) - robot.ankle)
-        turns = self._standing_turns(targets, limb, ticks, place, standing)
-        if float(_median(rotation[:, 2, 2])) > SOLE_LEVEL and abs(float(_median(turns))) < BEYOND_ANKLE:
-            return place, standing
+        if float(_median(rotation[:, 2, 2])) > SOLE_LEVEL:
+            forward = rotation[:, :, 0].mean(axis=0)
+            standing = exponential(np.array([[0.0, 0.0, float(np.arctan2(forward[1], forward[0]))]]))[0]
+            place[2] = _grounded(_median(chain[:, 2, 2]) - robot.ankle)
+            turns = self._standing_turns(targets, limb, ticks, place, standing)
+            if abs(float(_median(turns))) < BEYOND_ANKLE:
+                return place, standing
         # The rotation that is nearest to the mean
         left, _, right = np.linalg.svd(rotation.mean(axis=0))
         standing = left @ right
         level = _grounded(_median(self._lowest(limb, chain[:, 3], rotation)))
-        for _ in range(TURNED):
+        for turns_left in reversed(range(TURNED + 1)):
             # The lowest point of the sole stands where it is in the mean
             lowest = robot.surface[int(np.argmin(robot.surface @ standing[2]))]
             place = _median(chain[:, 3] + rotation @ lowest) - standing @ lowest
             place[2] = level - float(standing[2] @ lowest)
             turns = self._standing_turns(targets, limb, ticks, place, standing)
             most = float(turns[np.argmax(np.abs(turns))])
-            if abs(most) < LEAST_TURN:
+            if abs(most) < LEAST_TURN or not turns_left:
                 break
             standing = standing @ _pitched(np.array([most]))[0]
         return place, standing
@@ -212,7 +223,7 @@ class Planner:
         knee = self.knees([limb], chain[:, 0], chain[:, 1], ankle, targets.turns["pelvis"][ticks])
         return self._ankle_turns([limb], standing, knee - ankle)[:, 0]
 
-    def _ankles(self, targets: Targets) -> Array:
+    def ankles(self, targets: Targets) -> Array:
         """Where ankles of legs, or ends of those on points, are planned [ticks, feet, 3] [m]."""
         out = targets.chains[:, self._feet, 3]
         for number, limb in enumerate(self._feet):
@@ -220,14 +231,14 @@ class Planner:
                 out[:, number] += self._ankle[limb] * targets.turns[self.limbs[limb]][:, :, 2]
         return out
 
-    def lowering(self, targets: Targets) -> Array:
-        """How much the pelvis must be lower so that standing legs reach the ground [ticks] [m]."""
+    def lowering(self, targets: Targets, ankles: Array) -> Array:
+        """How much the pelvis must be lower so that standing legs reach their ankles [ticks] [m]."""
         held = targets.held[:, self._feet]
         if not held.any():
             return np.zeros(len(held))
-        legs = targets.chains[:, self._feet, 0] - self._ankles(targets)
+        legs = targets.chains[:, self._feet, 0] - ankles
         reach = STRETCH * self._bones[self._feet, :2].sum(axis=1)
-        most = np.sqrt(np.maximum(reach**2 - (legs[..., :2] ** 2).sum(axis=2), (0.2 * reach) ** 2))
+        most = np.sqrt(np.maximum(reach**2 - np.vecdot(legs[..., :2], legs[..., :2]), (0.2 * reach) ** 2))
         need = np.where(held, legs[..., 2] - most, 0.0).max(axis=1, initial=0.0)
         if not need.any():
             return np.asarray(need)
@@ -236,11 +247,11 @@ class Planner:
         width = max(round(2.0 * LOWERING / targets.dt), 1)
         return smoothed(np.asarray(maximum_filter1d(need, 2 * width + 1, mode="nearest")), LOWERING / targets.dt)
 
-    def lower(self, targets: Targets, low: Array) -> None:
-        """Lower the trunk [ticks] [m], and put knees between its hips and ankles."""
+    def lower(self, targets: Targets, low: Array, ankles: Array) -> None:
+        """Lower the trunk [ticks] [m], and put knees between its hips and :meth:`ankles`."""
         targets.pelvis[:, 2] -= low
         if self._feet and self.body.plan.upright:
-            ankles, legs = self._ankles(targets), targets.chains[:, self._feet]
+            legs = targets.chains[:, self._feet]
             legs[:, :, :2, 2] -= low[:, None, None]
             legs[:, :, 1] = self.knees(self._feet, legs[:, :, 0], legs[:, :, 1], ankles, targets.turns["pelvis"])
             legs[:, :, 1, 2] += lift(legs[:, :, 1, 2] - self._lie[self._feet])

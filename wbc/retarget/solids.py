@@ -11,17 +11,15 @@ from wbc.errors import WbcError
 from wbc.multibody import pin, to_pin
 from wbc.retarget.clip import Array
 from wbc.robot import Robot
-from wbc.robot.geometry.bodies import Raw, RawBox, RawCylinder, RawEllipsoid, bodies_of
+from wbc.robot.geometry.bodies import Raw, bodies_of
 from wbc.robot.geometry.hull import Hull
 from wbc.robot.geometry.link_balls import LinkBalls
-from wbc.robot.geometry.meshes import Mesh, box_mesh
-from wbc.shapes import Capsule, Sphere
+from wbc.robot.geometry.meshes import Mesh
+from wbc.robot.geometry.styles import polyhedron
+from wbc.shapes.solid import Solid
 from wbc.track.scene import link_meshes
 
 log = logging.getLogger("wbc")
-
-#: Corners about the rim of a cylinder
-RIM = 16
 
 
 def balls_of_joints(robot: Robot) -> dict[int, LinkBalls]:
@@ -36,8 +34,7 @@ def balls_of_joints(robot: Robot) -> dict[int, LinkBalls]:
 
     for link, shapes in robot.shapes.items():
         for placed in shapes:
-            if isinstance(placed.shape, (Sphere, Capsule)):
-                add(link, LinkBalls.of(placed.shape), placed.placement)
+            add(link, LinkBalls.of(placed.shape), placed.placement)
     with contextlib.suppress(WbcError):
         for body in bodies_of(robot):
             if body.mesh or not robot.shapes.get(body.link):
@@ -67,16 +64,8 @@ def surface_points(robot: Robot) -> dict[str, Array]:
 
 
 def _balls(body: Raw) -> LinkBalls:
-    """Of a body in its own frame."""
-    centers, radius = np.zeros((0, 3)), 0.0
-    if isinstance(body, (Sphere, Capsule)):
+    """Of a body in its own frame; of what is not round corners of a polyhedron around it."""
+    if isinstance(body, Solid):
         return LinkBalls.of(body)
-    if isinstance(body, RawEllipsoid):
-        radius = float(np.min(body.radii))
-        centers = np.diag(body.radii - radius)[[0, 0, 1, 1, 2, 2]] * np.array([1, -1] * 3)[:, None]
-    elif isinstance(body, RawCylinder):
-        angles, z = np.linspace(0.0, 2.0 * np.pi, RIM, endpoint=False), np.repeat([body.half, -body.half], RIM)
-        centers = np.stack([*np.tile(body.radius * np.array([np.cos(angles), np.sin(angles)]), 2), z], axis=1)
-    elif isinstance(body, (RawBox, Mesh)):
-        centers = np.asarray((box_mesh(body.half) if isinstance(body, RawBox) else body).vertices, dtype=float)
-    return LinkBalls(centers, np.full(len(centers), radius))
+    corners = (body if isinstance(body, Mesh) else polyhedron(body)[0]).vertices
+    return LinkBalls(corners, np.zeros(len(corners)))

@@ -84,12 +84,13 @@ def _covered(
     raw: RawBox | RawCylinder | RawEllipsoid, placement: own.SE3, style: Style, count: int
 ) -> tuple[PlacedShape, ...]:
     """Shapes around the polyhedron around a body; what that stands out by is added to their excess, a bound then."""
-    mesh, slack = _polyhedron(raw)
+    mesh, slack = polyhedron(raw)
     found = cover(mesh.moved(placement), style.kind, count, max(style.tolerance - slack, 0.0))
     return tuple(replace(shape, excess=shape.excess + slack) for shape in found)
 
 
-def _polyhedron(raw: RawBox | RawCylinder | RawEllipsoid) -> tuple[Mesh, float]:
+def polyhedron(raw: RawBox | RawCylinder | RawEllipsoid) -> tuple[Mesh, float]:
+    """(a polyhedron around a body, a bound of how far it stands out of it [m])."""
     if isinstance(raw, RawBox):
         return box_mesh(raw.half), 0.0
     if isinstance(raw, RawCylinder):
