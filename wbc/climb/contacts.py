@@ -35,18 +35,20 @@ class ContactKind(ABC):
     #: Whether the contact can pull the robot towards the surface
     pulls: ClassVar[bool] = False
 
-    def lower(self, friction: float, share: float = 1.0) -> Self:
+    def lower(self, friction: float, share: float = 1.0, soles: float | None = None) -> Self:
         """The kind on a surface of a friction, with a share of the lower one of both and of the sole.
 
             PointFoot(0.6).lower(0.5, 0.8)          # PointFoot(0.4)
 
         Args:
-            friction: of the surface [1]. share: of friction, and of lengths by which a sole bears moments [1].
+            friction: of the surface [1]. share: of friction [1]. soles: of the lengths by which a sole bears moments
+                [1]; None: the same.
         """
         own: float | None = getattr(self, "friction", None)
-        if own is None or (share == 1.0 and friction >= own):
+        soles = share if soles is None else soles
+        if own is None or (share == soles == 1.0 and friction >= own):
             return self
-        return replace(self, friction=share * min(own, friction), **self._soles(share))  # type: ignore[call-arg]  # kinds that have it
+        return replace(self, friction=share * min(own, friction), **self._soles(soles))  # type: ignore[call-arg]  # kinds that have it
 
     def _soles(self, share: float) -> dict[str, Any]:
         """Fields of a shorter sole."""
