@@ -25,6 +25,7 @@ COURSES = (
     ("anymal_c", "stepping_stones", 0.07),
     ("hexapod", "stepping_stones", 0.07),
     ("wall_climber", "wall", 0.2),
+    ("talos_hand", "rail", 0.25),
 )
 
 
