@@ -92,7 +92,8 @@ def test_a_change_of_a_class_of_an_items_field_changes_the_key(tmp_path: Path, m
     file = tmp_path / "own_kinds.py"
     file.write_text("from wbc.climb import PointFoot\n\n\nclass OwnFoot(PointFoot):\n    pass\n")
     spec = importlib.util.spec_from_file_location("own_kinds", file)
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     monkeypatch.setitem(sys.modules, "own_kinds", module)
     spec.loader.exec_module(module)
