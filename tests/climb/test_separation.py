@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.optimize import linprog
 
 from tests.climb.by_hand import climber
 from tests.repeats import ALL, MORE
@@ -70,3 +71,29 @@ def test_a_share_counts_of_friction_and_of_soles(kind: object, other: object) ->
     lower = kind.lower(0.5, 0.8)  # type: ignore[attr-defined]
     assert all(np.allclose(a, b) for a, b in zip(lower.cone(), other.cone(), strict=True))  # type: ignore[attr-defined]
     assert kind.lower(np.inf) == kind  # type: ignore[attr-defined]
+
+
+def test_a_flat_foot_bears_what_its_corners_bear() -> None:
+    """Referee: a linear program over forces at the corners, their friction within squares inside of its circle."""
+    foot, corner, drawn = FlatFoot((0.1, 0.05), 0.6), 0.6 / np.sqrt(2.0), np.random.default_rng(1)
+    slopes, bounds = foot.cone()
+    places = [np.array([x, y, 0.0]) for x in (-0.1, 0.1) for y in (-0.05, 0.05)]
+    wrenches = np.hstack([np.vstack([np.eye(3), pin.skew(place)]) for place in places])
+    squares = np.kron(np.eye(4), [[1.0, 0, -corner], [-1.0, 0, -corner], [0, 1.0, -corner], [0, -1.0, -corner]])
+    pressed = [(None, None), (None, None), (0.0, None)] * 4
+    borne = list[bool]()
+    for _ in range(200):
+        # Pressed with 1 N anywhere in the sole, pushed along and turned
+        force = [*drawn.uniform(-0.9 * corner, 0.9 * corner, 2), 1.0]
+        arm = [*drawn.uniform(-1.0, 1.0, 2) * foot.half_lengths, 0.0]
+        wrench = np.concatenate([force, np.cross(arm, force)])
+        wrench[5] = drawn.uniform(-1.0, 1.0) * 0.3 * sum(foot.half_lengths)
+        answer = linprog(np.zeros(12), squares, np.zeros(len(squares)), wrenches, wrench, pressed)
+        # Rows of Coulomb's circle are of the whole force; those of moments are what the corners say
+        turned = (slopes @ wrench <= bounds + 1e-12)[9:]
+        assert bool(turned.all()) == (answer.status == 0 and abs(wrench[5]) <= 0.3 * sum(foot.half_lengths))
+        borne.append(bool(turned.all()))
+    assert 50 < sum(borne) < 150
+    # At a corner there is nothing to turn about
+    at_corner = np.array([0.0, 0.0, 1.0, 0.05, -0.1, 0.005])
+    assert (slopes @ at_corner > bounds + 1e-6).any()

@@ -13,9 +13,9 @@ from tests.climb.arriving import arrives
 from tests.climb.by_hand import TRIPODS, climber, gait
 from tests.repeats import ALL, MORE, repeats
 from wbc.climb import ClimbOptions, ContactPlan, Equilibrium, first_stance, scenes
-from wbc.climb.checker import CheckRules
+from wbc.climb.checker import CheckRules, check
 from wbc.climb.drive import standing_plan
-from wbc.climb.loop import ClimbLoop, PlanReference
+from wbc.climb.loop import ClimbLoop, ClimbOutcome, PlanReference
 from wbc.climb.plants import CONTACT_TIME, ClimbPlant, PlantErrors
 from wbc.climb.scene import size_of
 from wbc.validation import Array
@@ -93,6 +93,18 @@ def test_feet_land_before_they_bear_their_load() -> None:
             places.append(data.oMf[frame].act(own.placement.translation)[:2])
         # While it comes down and takes its load within 0.2 s
         assert np.ptp(places, axis=0).max() < 6e-4
+
+
+def test_a_humanoid_stands_firm_on_stairs() -> None:
+    """On its first steps no sole tilts, slips or turns about an edge, and the motors are never at their limits for
+    long: plans leave the loop a part of the soles that it follows with.
+    """
+    plan = planned("talos_hand", "rail", 0, 1.0)
+    run = ClimbLoop(plan, ClimbPlant(plan.climber, plan.scene)).run(most=9.5)
+    assert run.outcome is ClimbOutcome.OUT_OF_TIME
+    report = check(run.log, plan.climber, run.scene, CheckRules.by_torques())
+    assert not report.violations
+    assert len({row for row in run.log.array("contact")[:, :2].ravel() if row >= 0}) > 3
 
 
 def test_loads_are_shared_by_what_contacts_bear() -> None:

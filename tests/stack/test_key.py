@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import sys
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -13,6 +14,8 @@ from tests.project.layout import module_name
 from tests.project.test_floors import PACKAGE_FILES, imported, part_of
 from tests.stack import small
 from wbc import Stack
+from wbc.climb import PointFoot
+from wbc.climb.loop.stack import FootholdContact
 from wbc.native.library import file_bytes
 from wbc.shapes import Box, PlacedShape, Sphere
 from wbc.stack import key
@@ -82,6 +85,24 @@ def test_a_change_in_any_part_changes_the_key(part: str, monkeypatch: pytest.Mon
         monkeypatch.undo()
         key._own_code.cache_clear()
     assert key.key(stack, "1") == before
+
+
+def test_a_change_of_a_class_of_an_items_field_changes_the_key(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rows of a contact are those of the kind that it is given, whose class is in another file."""
+    file = tmp_path / "own_kinds.py"
+    file.write_text("from wbc.climb import PointFoot\n\n\nclass OwnFoot(PointFoot):\n    pass\n")
+    spec = importlib.util.spec_from_file_location("own_kinds", file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    monkeypatch.setitem(sys.modules, "own_kinds", module)
+    spec.loader.exec_module(module)
+    robot = small.arm()
+    kinds = PointFoot(0.5), module.OwnFoot(0.5)
+    stacks = [Stack(robot, dt=0.01).add(FootholdContact("tip", kind)) for kind in kinds]
+    before = [key.key(stack, "1") for stack in stacks]
+    file.write_text(file.read_text() + "# changed\n")
+    assert [key.key(stack, "1") == known for stack, known in zip(stacks, before, strict=True)] == [True, False]
 
 
 @pytest.mark.parametrize("size", [0, 1, 1 << 16, (1 << 16) + 1, 3 << 16])

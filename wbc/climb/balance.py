@@ -40,7 +40,7 @@ class Equilibrium:
 
     Args:
         climber, scene: the robot and what it climbs.
-        friction: share of the coefficients of friction, and of soles, that counts [1].
+        friction: share of the coefficients of friction that counts, and its square of soles [1].
 
     :class:`wbc.climb.path_loads.PathLoads` adds what motion needs.
     """

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, Self
@@ -34,18 +35,20 @@ class ContactKind(ABC):
     #: Whether the contact can pull the robot towards the surface
     pulls: ClassVar[bool] = False
 
-    def lower(self, friction: float, share: float = 1.0) -> Self:
+    def lower(self, friction: float, share: float = 1.0, soles: float | None = None) -> Self:
         """The kind on a surface of a friction, with a share of the lower one of both and of the sole.
 
             PointFoot(0.6).lower(0.5, 0.8)          # PointFoot(0.4)
 
         Args:
-            friction: of the surface [1]. share: of friction, and of lengths by which a sole bears moments [1].
+            friction: of the surface [1]. share: of friction [1]. soles: of the lengths by which a sole bears moments
+                [1]; None: the same.
         """
         own: float | None = getattr(self, "friction", None)
-        if own is None or (share == 1.0 and friction >= own):
+        soles = share if soles is None else soles
+        if own is None or (share == soles == 1.0 and friction >= own):
             return self
-        return replace(self, friction=share * min(own, friction), **self._soles(share))  # type: ignore[call-arg]  # kinds that have it
+        return replace(self, friction=share * min(own, friction), **self._soles(soles))  # type: ignore[call-arg]  # kinds that have it
 
     def _soles(self, share: float) -> dict[str, Any]:
         """Fields of a shorter sole."""
@@ -98,7 +101,10 @@ class PointFoot(ContactKind):
 @dataclass(frozen=True)
 class FlatFoot(ContactKind):
     """A rectangle on a surface with friction: as ``PointFoot``, with its centre of pressure in the rectangle
-    (|m_x| <= Y f_z, |m_y| <= X f_z) and |m_z| <= friction (X + Y) / 2 f_z.
+    (|m_x| <= Y f_z, |m_y| <= X f_z), |m_z| <= friction (X + Y) / 2 f_z, and less where it is pressed near an edge,
+    about which it turns, or pushed along (Caron, Pham and Nakamura, ICRA 2015), with c = friction / sqrt(2):
+
+        |Y f_x +- c m_x| + |X f_y +- c m_y| +- m_z <= c (X + Y) f_z
 
     Attributes:
         half_lengths: X and Y, half of its sides along x and y [m].
@@ -124,7 +130,12 @@ class FlatFoot(ContactKind):
         arms = np.array([y, x, 0.5 * self.friction * (x + y)])
         sides = np.vstack([_MOMENTS, -_MOMENTS])
         sides[:, 2] = -np.tile(arms, 2)
-        return _pressing(self.friction, sides)
+        # Friction at each corner within a square inside of the circle
+        corner, (a, b, turn) = self.friction / np.sqrt(2.0), _SIGNS.T
+        yaw = np.zeros((len(_SIGNS), 6))
+        yaw[:, 0], yaw[:, 1], yaw[:, 2] = a * y, b * x, -corner * (x + y)
+        yaw[:, 3], yaw[:, 4], yaw[:, 5] = turn * a * corner, turn * b * corner, turn
+        return _pressing(self.friction, np.vstack([sides, yaw]) if self.friction < np.inf else sides)
 
 
 @dataclass(frozen=True)
@@ -196,6 +207,8 @@ class SuctionPad(ContactKind):
 
 #: Rows of the three moments in a wrench
 _MOMENTS = np.eye(6)[3:]
+#: Signs of the two sizes and of m_z in a flat foot's rows of yaw
+_SIGNS = np.array(list(itertools.product((1.0, -1.0), repeat=3)))
 
 
 def _pressing(friction: float, moments: Array) -> tuple[Array, Array]:

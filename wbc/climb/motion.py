@@ -87,7 +87,8 @@ class MotionOptions:
         margin: least slack of equilibrium at rest on the way, of the limbs that hold, in shares of the weight; half of
             it where the body shifts and no limb lifts.
         inertia: share of the slack of equilibrium at rest that accelerations may use, where something weighs [1].
-        friction: share of the coefficients of friction, and of soles, on which equilibrium counts on the way [1].
+        friction: share of the coefficients of friction, and its square of soles, on which equilibrium counts on the
+            way [1].
         speeds: see :class:`MotionSpeeds`.
         effort: share of the joints' efforts within which torques at rest stay on the way [1]; inf: they do not count.
 

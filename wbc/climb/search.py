@@ -124,7 +124,7 @@ class StanceOptions:
         gait: sets of limbs, by name, that go at once where that can be.
         forbidden: moves (contacts before, contacts after) that may not be, as rows of footholds.
         effort: share of the joints' efforts within which torques at rest stay [1]; inf: efforts do not count.
-        friction: share of the coefficients of friction, and of soles, that counts [1].
+        friction: share of the coefficients of friction that counts, and its square of soles [1].
     """
 
     margin: float = 0.02

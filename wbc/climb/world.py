@@ -110,7 +110,8 @@ class ClimbWorld:
         margin: from limits of joints [m, rad]. clear, apart: distances that links keep from bodies and from each other
             [m].
         spare: how much more they keep, also from what tips hold, than :class:`Clearances` says [m].
-        friction: share of the coefficients of friction, and of soles, that counts [1].
+        friction: share of the coefficients of friction that counts, and its square of soles [1]: a loop that counts on
+            the share of them has the rest to follow with.
 
     Attributes:
         places: poses ``(places, 12)``. hold: the foothold of each. start: places of the start's contacts.
@@ -377,7 +378,7 @@ class ClimbWorld:
             lower = np.minimum(float(getattr(one.contact, "friction", np.inf)), frictions)
             for friction in dict.fromkeys(lower[able].tolist()):
                 table[limb, able & (lower == friction)] = len(self._slack_cones)
-                self._slack_cones.append(SlackCone.of(one.contact.lower(friction, share)))
+                self._slack_cones.append(SlackCone.of(one.contact.lower(friction, share, share**2)))
         numbers = (_ConeStruct * max(1, len(self._slack_cones)))()
         self._cone_arrays = []
         for row, cone in zip(numbers, self._slack_cones, strict=False):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import hashlib
 import importlib.util
@@ -43,11 +44,13 @@ PARTS = (
 def key(stack: Declaration, version: str) -> str:
     """Hash of the declaration, of the code that builds from it, and of package versions.
 
-    Weights, targets, gains and masks are run-time values and not in it. Of an item that is not this package's own, the
-    file that its class stands in is in the hash, but not what that file imports.
+    Weights, targets, gains and masks are run-time values and not in it. Of an item that is not this package's own, and
+    of dataclasses that are its fields, the files that the classes stand in are in the hash, not what those import.
     """
     versions = [ca.CasadiMeta.version(), algebra(stack.robot.tree).__version__, np.__version__, version]
-    classes = {base for entry in stack.entries for item in inner_items(entry.item) for base in type(item).__mro__}
+    all_items = [item for entry in stack.entries for item in inner_items(entry.item)]
+    values = [value for item in all_items for value in vars(item).values() if dataclasses.is_dataclass(value)]
+    classes = {base for part in (*all_items, *values) for base in type(part).__mro__}
     items = sorted({_source(base) for base in classes})
     text = json.dumps([stack.key_data(), versions, _own_code(), items], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]

@@ -53,9 +53,9 @@ class CheckRules:
     def by_torques(cls) -> CheckRules:
         """Of a simulator with soft contacts: limbs close up to 7.5 mm beside their footholds, grips in the body
         too, and feet slip by up to 5 mm, grips by 1 mm; their impact accelerates joints beyond what they are asked
-        for, up to twice.
+        for, up to twice, and moves those that rest at a limit by up to 0.5 mrad or mm beyond it.
         """
-        return cls(hold_distance=0.008, slip=0.005, depth=0.004, acceleration=1.0)
+        return cls(position=5e-4, hold_distance=0.008, slip=0.005, depth=0.004, acceleration=1.0)
 
     def __post_init__(self) -> None:
         for field in fields(self):
