@@ -145,14 +145,15 @@ static void bend_rows(wbc_tick *t, const double *bend) {
  * lose what their rates say here, and on the way on as much in the second order. 0 where that is more than such a motion of their
  * joints can bend them by, so that they were not kept, or where it is long. */
 static int bends_as_before(const wbc_tick *t, double *guess) {
+    double moved[NV];
+    for (int i = 0; i < NV; i++) moved[i] = fabs(t->v_last[i]) / dof_scale[i] * t->dt;
     for (int k = 0; k < MC; k++) {
         double rate = 0.0, length = 0.0;
         guess[k] = 0.0;
         if (bent[k] != 2 || t->free_low[k] != t->free_high[k]) continue;
         for (int e = a_start[k]; e < a_end[k]; e++) {
-            const double v = t->v_last[a_col[e]];
-            rate += t->at[e] * v;
-            length += fabs(v) / dof_scale[a_col[e]] * t->dt;
+            rate += t->at[e] * t->v_last[a_col[e]];
+            length += moved[a_col[e]];
         }
         guess[k] = rate * t->dt;
         if (!(length <= SHORT && fabs(guess[k]) <= 0.5 * length * length * row_scale[k])) return 0;
@@ -187,9 +188,9 @@ static int same_rows(const wbc_tick *t) {
         outside |= (t->x[i] < t->low[i] - rounding) | (t->x[i] > t->high[i] + rounding);
     }
     for (int i = outside ? 0 : NV; i < M_ALL; i++) {
-        if (t->sense[i] & ACTIVE || (i >= NV && (t->idle[i - NV] || HELD(t, i - NV)))) continue;
         /* Rows that are taken out hold by what follows from them */
         if (REDUCES && t->reduced && t->low[i] == t->high[i]) continue;
+        if (t->sense[i] & ACTIVE || (i >= NV && (t->idle[i - NV] || HELD(t, i - NV)))) continue;
         const double value = i < NV ? t->x[i] : row_at(t, i - NV, t->x);
         const double rounding = TOLERANCE * (i < NV ? dof_scale[i] : row_scale[i - NV]);
         if (value < t->low[i] - rounding || value > t->high[i] + rounding) return 0;

@@ -187,33 +187,41 @@ INLINE void form_gram(const wbc_tick *t, const double *product, double *gram) {
         }
 }
 
+/* Pivot a of `gram`: what it takes from later rows, and what of `inverse` goes with them; 0 where it is not positive */
+INLINE int take_pivot(double *gram, int a, int width, double *row, double *roots, double *inverse) {
+    const double *own = gram + a * WIDE, pivot = own[a], reciprocal = -1.0 / pivot;
+    if (!(pivot > 0.0)) return 0;
+    roots[a] = 1.0 / sqrt(pivot);
+    inverse[a * WIDE + a] = 1.0;
+    /* Groups that have entries right of the pivot */
+    for (int at = (a + 1) & ~3; at < THIN; at += 4) {
+        const four part = GIVEN_FOUR(own + at) * EACH(reciprocal);
+        FOUR(row + at) = at > a ? part : BEHIND(part, a & 3);
+    }
+    for (int b = a + 1; b < width; b++)
+        for (int at = b & ~3; at < THIN; at += 4) {
+            double *other = gram + b * WIDE + at;
+            FOUR(other) = MADD(EACH(own[b]), GIVEN_FOUR(row + at), GIVEN_FOUR(other));
+        }
+    for (int c = 0; c <= a && a + 1 < width; c++)
+        for (int at = (a + 1) & ~3; at < THIN; at += 4) {
+            double *other = inverse + c * WIDE + at;
+            FOUR(other) = MADD(EACH(inverse[c * WIDE + a]), GIVEN_FOUR(row + at), GIVEN_FOUR(other));
+        }
+    return 1;
+}
+
 /* R^-1 of R'R = `gram`, whose upper triangle becomes R without the roots of its pivots, on its diagonal; 0 where it is not positive
- * definite. Rows wait for reciprocals of pivots only, not for their roots. */
-INLINE int invert(double *gram, int width, double *inverse) {
+ * definite. Rows wait for reciprocals of pivots only, not for their roots. `few`: a number that the compiler knows, up to FEW. */
+INLINE int invert(double *gram, int width, double *inverse, int few) {
     double row[WIDE] = {0}, roots[WIDE] = {0};
     for (int a = 0; a < width; a++)
         for (int at = 0; at < THIN; at += 4) FOUR(inverse + a * WIDE + at) = (four){0};
-    for (int a = 0; a < width; a++) {
-        const double *own = gram + a * WIDE, pivot = own[a], reciprocal = -1.0 / pivot;
-        if (!(pivot > 0.0)) return 0;
-        roots[a] = 1.0 / sqrt(pivot);
-        inverse[a * WIDE + a] = 1.0;
-        /* Groups that have entries right of the pivot */
-        for (int at = (a + 1) & ~3; at < THIN; at += 4) {
-            const four part = GIVEN_FOUR(own + at) * EACH(reciprocal);
-            FOUR(row + at) = at > a ? part : BEHIND(part, a & 3);
-        }
-        for (int b = a + 1; b < width; b++)
-            for (int at = b & ~3; at < THIN; at += 4) {
-                double *other = gram + b * WIDE + at;
-                FOUR(other) = MADD(EACH(own[b]), GIVEN_FOUR(row + at), GIVEN_FOUR(other));
-            }
-        for (int c = 0; c <= a; c++)
-            for (int at = (a + 1) & ~3; at < THIN; at += 4) {
-                double *other = inverse + c * WIDE + at;
-                FOUR(other) = MADD(EACH(inverse[c * WIDE + a]), GIVEN_FOUR(row + at), GIVEN_FOUR(other));
-            }
-    }
+    UNROLLED
+    for (int a = 0; few && a < width; a++)
+        if (!take_pivot(gram, a, width, row, roots, inverse)) return 0;
+    for (int a = 0; !few && a < width; a++)
+        if (!take_pivot(gram, a, width, row, roots, inverse)) return 0;
     for (int a = 0; a < width; a++)
         for (int at = a & ~3; at < THIN; at += 4) FOUR(inverse + a * WIDE + at) *= GIVEN_FOUR(roots + at);
     return 1;
@@ -221,7 +229,8 @@ INLINE int invert(double *gram, int width, double *inverse) {
 
 /* The factor of `gram` as its inverse. The usual number of variables is known to the compiler. */
 static int factor_gram(const wbc_tick *t, double *gram, double *inverse) {
-    return t->width == NV - REDUCED ? invert(gram, NV - REDUCED, inverse) : invert(gram, t->width, inverse);
+    if (t->width != NV - REDUCED) return invert(gram, t->width, inverse, 0);
+    return NV - REDUCED <= FEW ? invert(gram, NV - REDUCED, inverse, 1) : invert(gram, NV - REDUCED, inverse, 0);
 }
 
 INLINE void copy_columns(const wbc_tick *t, const double *from, double *to) {
