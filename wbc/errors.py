@@ -55,6 +55,14 @@ class UnknownNameError(WbcError):
         super().__init__(field, value, hint, ranked)
 
 
+class UnknownAttributeError(UnknownNameError, AttributeError):
+    """A run-time value, or another attribute, that an object does not have."""
+
+
+class FixedAttributeError(WbcError, AttributeError):
+    """An attribute that cannot be set."""
+
+
 class DuplicateNameError(WbcError):
     """A name that is taken already."""
 

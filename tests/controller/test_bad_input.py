@@ -16,8 +16,7 @@ from tests.controller.stacks import DT, robot
 from tests.controller.twins import BACKENDS, POSE, TURN, make, next_ticks, prepare, state
 from tests.repeats import ALL, MORE, covering
 from wbc import Controller, WbcError
-from wbc.controller.handle import UnknownValueError
-from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, UnknownNameError
+from wbc.errors import NotFiniteError, RangeError, RotationError, ShapeError, UnknownAttributeError, UnknownNameError
 
 SKEWED = TURN + 1e-3 * np.eye(3)
 #: Of calls before the first tick every so many is tried
@@ -181,14 +180,17 @@ NAMES = {
     "item": Case(read_item, "hnad", UnknownNameError, "item", "hand"),
     "item number": Case(read_item, 3, UnknownNameError, "item"),
     "item list": Case(read_item, ["hand"], UnknownNameError, "item", "hand"),
-    "write": Case(write_one("hand"), "targt", UnknownValueError, "hand.targt", "target"),
+    "write": Case(write_one("hand"), "targt", UnknownAttributeError, "hand.targt", "target"),
     "read": Case(
-        lambda c, name: getattr(c["hand"], name), "feedforwrd", UnknownValueError, "hand.feedforwrd", "feedforward"
+        lambda c, name: getattr(c["hand"], name), "feedforwrd", UnknownAttributeError, "hand.feedforwrd", "feedforward"
     ),
-    "write private": Case(write_one("hand"), "_mask", UnknownValueError, "hand._mask", "mask"),
-    "rate of a task": Case(write_one("hand"), "rate", UnknownValueError, "hand.rate", "target"),
-    "weight of a constraint": Case(write_one("ball"), "weight", UnknownValueError, "ball.weight"),
-    "gain of bounds": Case(write_one("limits"), "gain", UnknownValueError, "limits.gain"),
+    "write private": Case(write_one("hand"), "_mask", UnknownAttributeError, "hand._mask", "mask"),
+    "rate of a task": Case(write_one("hand"), "rate", UnknownAttributeError, "hand.rate", "target"),
+    "weight of a constraint": Case(write_one("ball"), "weight", UnknownAttributeError, "ball.weight"),
+    "gain of bounds": Case(write_one("limits"), "gain", UnknownAttributeError, "limits.gain"),
+    "attribute": Case(
+        lambda c, name: setattr(c, name, 1.0), "polcy", UnknownAttributeError, "Controller.polcy", "policy"
+    ),
     "solver": Case(compile_with("solver"), "dapq", UnknownNameError, "solver", "daqp"),
     "solver number": Case(compile_with("solver"), 1, UnknownNameError, "solver"),
     "backend": Case(compile_with("backend"), "natve", UnknownNameError, "backend", "native"),

@@ -10,8 +10,7 @@ import pytest
 import wbc
 from tests.controller.stacks import robot
 from tests.items import ITEMS
-from wbc.controller.handle import UnknownValueError
-from wbc.errors import DuplicateNameError, UnknownNameError
+from wbc.errors import DuplicateNameError, UnknownAttributeError, UnknownNameError
 from wbc.pages import stub
 from wbc.stack.layout import Layout
 from wbc.tasks import EndEffector, Posture, WorkspaceBox, registry
@@ -45,9 +44,9 @@ def test_a_misspelt_value_fails_with_the_nearest_name() -> None:
     hand = EndEffector("panda_hand_tcp")
     controller = wbc.Stack(robot("panda"), 0.01).add(hand, name="hand").compile(backend="vm")
     for handle in (controller["hand"], controller[hand]):
-        with pytest.raises(UnknownValueError, match="did you mean 'target'"):
+        with pytest.raises(UnknownAttributeError, match="did you mean 'target'"):
             handle.taget = 3
-        with pytest.raises(UnknownValueError, match="did you mean 'gain'"):
+        with pytest.raises(UnknownAttributeError, match="did you mean 'gain'"):
             handle.get("gian")
     controller[hand].gain = 3.0
     assert controller["hand"].get("gain") == 3.0

@@ -15,8 +15,7 @@ from tests.controller.stacks import DT, robot
 from tests.refusals import assert_refused
 from wbc.api import Controller, Stack
 from wbc.controller import Status
-from wbc.controller.handle import UnknownValueError
-from wbc.errors import NotFiniteError, RangeError
+from wbc.errors import NotFiniteError, RangeError, UnknownAttributeError
 from wbc.tasks import EndEffector, Fixed, FrameVelocityLimit, Hold, JointLimits, Obstacle, Posture
 
 TIP, MIDDLE = "panda_hand_tcp", "panda_link5"
@@ -119,7 +118,7 @@ def test_prices_change_at_run_time_and_ramp(tick: Controller) -> None:
     tick["slow"].price = 4.0
     excess()
     assert tick["slow"].price == 4.0, "setting the price ends the ramp"
-    assert_refused(lambda: tick["limits"].ramp(1.0, 1.0), UnknownValueError, "limits.ramp")
+    assert_refused(lambda: tick["limits"].ramp(1.0, 1.0), UnknownAttributeError, "limits.ramp")
     with pytest.raises(RangeError, match="price"):
         tick["slow"].price = -1.0
     assert_refused(lambda: tick["slow"].ramp(1e12, 1.0), RangeError, "price")

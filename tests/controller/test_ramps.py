@@ -10,8 +10,7 @@ from tests.controller.stacks import DT, robot
 from tests.refusals import assert_refused
 from wbc.api import Controller, Stack
 from wbc.controller import core_of
-from wbc.controller.handle import UnknownValueError
-from wbc.errors import RangeError
+from wbc.errors import RangeError, UnknownAttributeError
 from wbc.tasks import JointLimits, Posture
 
 
@@ -93,7 +92,7 @@ def test_another_dt_and_refused_steps(tick: Controller) -> None:
 def test_bad_ramps_are_refused(tick: Controller) -> None:
     assert_refused(lambda: tick["down"].ramp(-1.0, 1.0), RangeError, "down.ramp.weight")
     assert_refused(lambda: tick["down"].ramp(1.0, -1.0), RangeError, "down.ramp.seconds")
-    assert_refused(lambda: tick["limits"].ramp(1.0, 1.0), UnknownValueError, "")
+    assert_refused(lambda: tick["limits"].ramp(1.0, 1.0), UnknownAttributeError, "")
     assert not core_of(tick).ramps
 
 

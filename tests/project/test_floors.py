@@ -12,7 +12,9 @@ import pytest
 from tests.project.layout import ROOT, module_name, nodes, relative, sources
 
 #: Parts of the package, floor by floor from the ground up. Solvers know nothing of robots: see ONLY.
-GROUND = "archives cores errors extras interrupts lazy multibody pickling quick_dataclasses rotations shapes style"
+GROUND = (
+    "archives cores errors extras interrupts lazy multibody pickling quick_dataclasses rotations sealed shapes style"
+)
 LEVELS = (
     f"{GROUND} linear_program terminal validation",
     "estimation geometry log native symbolic",

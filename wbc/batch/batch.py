@@ -16,10 +16,11 @@ from wbc.batch.derivatives import Derivatives
 from wbc.batch.engine import BatchEngine, Clones, Compiled, Given
 from wbc.batch.pullback import Pullback, reason_against
 from wbc.controller.compiled_stack import CompiledStack, core_of
-from wbc.controller.handle import CONFIGURATION, NUMBERS, POSE, Handle, UnknownValueError
+from wbc.controller.handle import CONFIGURATION, NUMBERS, POSE, Handle
 from wbc.controller.together import main_input
 from wbc.cores import cores
-from wbc.errors import RangeError, ShapeError, SolverError
+from wbc.errors import RangeError, ShapeError, SolverError, UnknownAttributeError
+from wbc.sealed import Sealed
 from wbc.stack.codegen import unit_groups
 from wbc.stack.layout import Slot
 from wbc.stack.program import left_to_loops
@@ -32,7 +33,7 @@ from wbc.validation import Array
 MOST = 2**31 - 1
 
 
-class Batch:
+class Batch(Sealed):
     """n robots with the same stack, each with its own run-time values, last command and active set.
 
         batch = controller.batch(10_000)
@@ -46,6 +47,8 @@ class Batch:
         count: n. threads: that tick at a time. inputs: what robots' ticks read [n, k]; not for users.
         changes: how often anything was changed.
     """
+
+    _changing = ("changes",)
 
     def __init__(self, controller: CompiledStack, count: int, threads: int | None = None) -> None:
         core = core_of(controller)
@@ -168,7 +171,7 @@ class Batch:
         """Where an item's weights are, and the numbers for them."""
         field = f"{handle.item_name}.weight"
         if "weight" not in handle.names:
-            raise UnknownValueError(field, "weight", handle.names)
+            raise UnknownAttributeError(field, "weight", handle.names)
         given = validation.real_array(field, numbers.taken(value))
         if given.shape not in ((), (self.count,)):
             raise ShapeError(field, value, f"expected one number or {self.count}, is of shape {given.shape}")

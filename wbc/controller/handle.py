@@ -10,7 +10,7 @@ import numpy as np
 
 from wbc import validation
 from wbc.controller.ramps import Ramps
-from wbc.errors import NotFiniteError, RangeError, UnknownNameError
+from wbc.errors import NotFiniteError, RangeError, UnknownAttributeError
 from wbc.multibody import is_pose
 from wbc.robot import Robot
 from wbc.stack.declaration import Declaration
@@ -59,10 +59,6 @@ class Owner(Protocol):
 
     def start_ramp(self, handle: Handle, weight: float, seconds: float) -> None:
         """See :meth:`Handle.ramp`."""
-
-
-class UnknownValueError(UnknownNameError, AttributeError):
-    """An item has no run-time value of that name."""
 
 
 class Handle:
@@ -195,7 +191,7 @@ class Handle:
             self._owner.ramps.stop(self.item_name)
             super().__setattr__("_weight", weight)
         else:
-            raise UnknownValueError(field, name, self.names)
+            raise UnknownAttributeError(field, name, self.names)
         self.apply()
 
     if not TYPE_CHECKING:
@@ -209,7 +205,7 @@ class Handle:
             UnknownNameError: there is none of that name.
         """
         if not isinstance(name, str) or name not in {*self.names, *self._block.slots}:
-            raise UnknownValueError(self._field("get"), name, self.names)
+            raise UnknownAttributeError(self._field("get"), name, self.names)
         return self._get(name)
 
     def ramp(self, weight: float, seconds: float) -> None:
@@ -221,7 +217,7 @@ class Handle:
             UnknownNameError: neither a task nor soft. RangeError, ShapeError: a negative weight or time.
         """
         if self._block.form != "task" and self._ramped is None:
-            raise UnknownValueError(self._field("ramp"), "ramp", self.names)
+            raise UnknownAttributeError(self._field("ramp"), "ramp", self.names)
         last = validation.scalar(self._field("ramp.weight"), weight, low=0.0)
         if self._ramped is not None:
             last = float(self._checked(self._ramped, last)[0])
@@ -257,7 +253,7 @@ class Handle:
         settable = [name for name, slot in self._block.slots.items() if not slot.input.sensed]
         for name in values:
             if name not in settable:
-                raise UnknownValueError(self._field(name), name, settable)
+                raise UnknownAttributeError(self._field(name), name, settable)
         numbers = {name: self.checked(name, value) for name, value in values.items()}
         self._check_order(numbers)
         return numbers
@@ -357,11 +353,11 @@ class Handle:
         """Where an input is in the buffer.
 
         Raises:
-            UnknownValueError: there is no such input.
+            UnknownAttributeError: there is no such input.
         """
         slot: Slot | None = self._block.slots.get(name)
         if slot is None:
-            raise UnknownValueError(self._field(name), name, self.names)
+            raise UnknownAttributeError(self._field(name), name, self.names)
         return slot
 
     def _field(self, name: str) -> str:

@@ -6,8 +6,8 @@
     controller[hand].target = pose        # an EndEffectorHandle
     controller["hand"].target = pose      # the same handle; the checker knows only that it is one of these classes
 
-A misspelt value is an error of the type checker in both, and an :class:`UnknownValueError` when it runs. Values that an
-item of the user's own declares pass the checker through the item; through its name they are set and read with
+A misspelt value is an error of the type checker in both, and an :class:`UnknownAttributeError` when it runs. Values
+that an item of the user's own declares pass the checker through the item; through its name they are set and read with
 :meth:`Handle.set` and :meth:`Handle.get`.
 """
 
@@ -18,11 +18,12 @@ from typing import Any
 
 from wbc.controller.handle import Handle
 from wbc.errors import DuplicateNameError, UnknownNameError
+from wbc.sealed import Sealed
 from wbc.stack.declaration import Declaration
 from wbc.tasks.base import Item
 
 
-class Handles:
+class Handles(Sealed):
     """Run-time values of the items of a stack, by name or by the item itself as it was added."""
 
     def __init__(self, handles: Mapping[str, Handle], stack: Declaration) -> None:

@@ -140,6 +140,8 @@ class MotionPlanner(Handles):
         CompileError: no compiler, and nothing was compiled ahead.
     """
 
+    _changing = ("coordinates",)
+
     def __init__(self, stack: Declaration, keep: Iterable[str] = ()) -> None:
         from wbc import __version__
 

@@ -17,6 +17,7 @@ from wbc.api import Controller
 from wbc.program import leaves, steps
 from wbc.program.hand import Gripper, ProgramHand
 from wbc.program.steps import Guard, Program
+from wbc.sealed import Sealed
 
 State = Literal["running", "paused", "succeeded", "failed", "aborted"]
 
@@ -46,7 +47,7 @@ class Event:
     reason: str
 
 
-class Runner:
+class Runner(Sealed):
     """Runs a program on a controller.
 
         runner = Runner(Program.read("insert.yaml"), controller, grippers={"gripper": gripper})
@@ -66,6 +67,8 @@ class Runner:
     Raises:
         UnknownNameError: a hand, task or gripper that there is not. ShapeError: a hand that is no ``EndEffector``.
     """
+
+    _changing = ("q", "signals")
 
     def __init__(
         self, program: Program, controller: Controller, *, grippers: Mapping[str, Gripper] | None = None

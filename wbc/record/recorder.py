@@ -23,6 +23,7 @@ from wbc.log.file import Columns, FileWriter
 from wbc.record.background import BackgroundWriter
 from wbc.record.recording import FORMAT, RecordingError
 from wbc.record.rows import RowWriting, TickRow
+from wbc.sealed import Sealed
 from wbc.stack.declaration import Declaration
 from wbc.stack.layout import Layout
 
@@ -53,7 +54,7 @@ BEHIND = 1.0
 PACKAGES = ("casadi", "pin", "daqp", "osqp", "numpy")
 
 
-class Recorder:
+class Recorder(Sealed):
     """Writes every tick of a controller into a file; made by :meth:`wbc.Controller.record`.
 
         with controller.record("run.npz") as recorder:

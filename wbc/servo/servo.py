@@ -14,6 +14,7 @@ from wbc.controller import Step
 from wbc.controller.compiled_stack import CompiledStack
 from wbc.errors import BoundsError, RangeError, UnsupportedJointError
 from wbc.multibody import pin
+from wbc.sealed import Sealed
 from wbc.servo.laws import Feedback, quickness
 from wbc.servo.response import ENOUGH, PER_JOINT, SHOWN, Identification, Response
 from wbc.simulation import Command, CommandKind
@@ -84,7 +85,7 @@ class ServoStep:
     error: Array
 
 
-class Servo:
+class Servo(Sealed):
     """Lets a robot follow a controller through servos of positions, velocities or torques.
 
         servo = Servo(controller, "position")
@@ -128,6 +129,8 @@ class Servo:
         UnknownNameError: another kind. UnsupportedJointError: a base that moves, which no servo holds.
         ShapeError, NotFiniteError, RangeError, BoundsError: arguments that make no sense.
     """
+
+    _changing = ("doubt", "response")
 
     def __init__(
         self,

@@ -24,6 +24,7 @@ from wbc.multibody import algebra
 from wbc.quick_dataclasses import dataclass
 from wbc.robot import Robot
 from wbc.robot.robot import checked_robot
+from wbc.sealed import Sealed
 from wbc.stack.commands import COMMANDS
 from wbc.symbolic.kinematics import WORLD
 from wbc.tasks import inputs
@@ -107,7 +108,7 @@ class Entry:
 REST = 5.0
 
 
-class Declaration:
+class Declaration(Sealed):
     """Items on a robot. See :class:`wbc.Stack`, which adds ``compile``."""
 
     #: What it is compiled to command, see :meth:`commanding`

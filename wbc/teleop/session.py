@@ -31,6 +31,7 @@ from wbc.coordinates.scales import scales
 from wbc.errors import RangeError
 from wbc.robot import Robot
 from wbc.robots.operator_arms import OPERATOR_ARMS
+from wbc.sealed import Sealed
 from wbc.tasks import Item
 from wbc.teleop.order import Order
 from wbc.validation import Array
@@ -84,7 +85,7 @@ class Seen:
     ramping: bool
 
 
-class Teleoperation:
+class Teleoperation(Sealed):
     """Drives an arm by an operator's orders.
 
         session = Teleoperation("spdm", ["M1", "M6"])

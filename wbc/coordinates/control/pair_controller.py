@@ -23,6 +23,7 @@ from wbc.coordinates.pair import CoordinatePair
 from wbc.coordinates.rate_matrices import RateMatrices
 from wbc.coordinates.rows import Coordinate, coordinates
 from wbc.robot import Robot
+from wbc.sealed import Sealed
 from wbc.tasks import Item
 from wbc.validation import Array
 
@@ -30,7 +31,7 @@ from wbc.validation import Array
 PAIR_SHARE = 0.8
 
 
-class PairController:
+class PairController(Sealed):
     """Drives a robot by the rates of the active pair's task coordinates.
 
         control = PairController(robot, [first, second], dt=0.02)
@@ -56,6 +57,8 @@ class PairController:
         declared: the pairs' stack. controller: its compiled controller.
         active: name of the active pair. blending: whether a switch is going on.
     """
+
+    _changing = ("active", "blending")
 
     def __init__(
         self,
