@@ -54,7 +54,8 @@ class Cone:
     def around(self) -> tuple[Array, Array]:
         """(dx / de ``[columns, n n]``, c ``[n n]``) where x is."""
         turned = np.linalg.solve(self._near, self._factor)
-        return self._share @ np.kron(self._factor, self._factor), (turned.T @ turned - self._one).ravel()
+        slopes = np.asarray(self._share @ np.kron(self._factor, self._factor))
+        return slopes, (turned.T @ turned - self._one).ravel()
 
     def stretches(self, e: Array) -> Array:
         """Eigenvalues of E ``[n]``; P stays positive definite as long as 1 plus them is above 0."""

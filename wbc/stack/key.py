@@ -49,8 +49,8 @@ def key(stack: Declaration, version: str) -> str:
     """
     versions = [ca.CasadiMeta.version(), algebra(stack.robot.tree).__version__, np.__version__, version]
     all_items = [item for entry in stack.entries for item in inner_items(entry.item)]
-    values = [value for item in all_items for value in vars(item).values() if dataclasses.is_dataclass(value)]
-    classes = {base for part in (*all_items, *values) for base in type(part).__mro__}
+    values = [type(value) for item in all_items for value in vars(item).values() if dataclasses.is_dataclass(value)]
+    classes = {base for kind in (*map(type, all_items), *values) for base in kind.__mro__}
     items = sorted({_source(base) for base in classes})
     text = json.dumps([stack.key_data(), versions, _own_code(), items], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
