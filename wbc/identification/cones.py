@@ -31,7 +31,7 @@ SETTLED = 1e-6
 INSIDE = 0.999
 
 
-class Cone:
+class SemidefiniteCone:
     """One positive definite matrix of the problem.
 
     Args:
@@ -66,7 +66,7 @@ class Cone:
         self._factor = self._factor @ np.linalg.cholesky(self._one + e.reshape(self._one.shape))
 
 
-def least_squares(R: Array, z: Array, cones: Sequence[Cone], weight: float) -> Array:
+def least_squares(R: Array, z: Array, cones: Sequence[SemidefiniteCone], weight: float) -> Array:
     """x of the least; columns that belong to no cone are 0."""
     x = np.zeros(R.shape[1])
     for cone in cones:
@@ -85,7 +85,7 @@ def least_squares(R: Array, z: Array, cones: Sequence[Cone], weight: float) -> A
         now = max(FALL * now, weight)
 
 
-def _step(R: Array, z: Array, cones: Sequence[Cone], x: Array, weight: float) -> float:
+def _step(R: Array, z: Array, cones: Sequence[SemidefiniteCone], x: Array, weight: float) -> float:
     """One step of Newton's, into x and the cones; its decrement."""
     parts = [cone.around() for cone in cones]
     turned = np.hstack([R[:, cone.columns] @ slope for cone, (slope, _) in zip(cones, parts, strict=True)])

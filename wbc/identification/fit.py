@@ -18,7 +18,7 @@ from scipy.linalg import qr
 
 from wbc import validation
 from wbc.errors import InfeasibleError, RangeError
-from wbc.identification.cones import Cone, least_squares
+from wbc.identification.cones import SemidefiniteCone, least_squares
 from wbc.identification.parameter_base import BaseParameters, base_parameters
 from wbc.identification.pseudo_inertia import (
     TO_PSEUDO,
@@ -105,11 +105,11 @@ def identify(regression: Regression, samples: Samples, *, noise: Array | float |
     cones = []
     for k in moving:
         own = slice(PER_BODY * k, PER_BODY * (k + 1))
-        cones.append(Cone(own, TO_PSEUDO, pseudo_inertia(_solid(start[own]))))
+        cones.append(SemidefiniteCone(own, TO_PSEUDO, pseudo_inertia(_solid(start[own]))))
     for column in range(PER_BODY * bodies, W.shape[1]):
         if shown := float(np.linalg.norm(R[:, column])):
             little = LITTLE * float(np.linalg.norm(z)) / shown
-            cones.append(Cone(slice(column, column + 1), np.eye(1), np.array([[little]])))
+            cones.append(SemidefiniteCone(slice(column, column + 1), np.eye(1), np.array([[little]])))
     phi = least_squares(R, z, cones, PRIOR)
     base = base_parameters(W)
     columns = list(base.columns)

@@ -33,6 +33,8 @@ PARTS = (
     "wbc.quick_dataclasses",
     "wbc.robot",
     "wbc.rotations",
+    "wbc.rotations",
+    "wbc.sealed",
     "wbc.shapes",
     "wbc.stack",
     "wbc.symbolic",
