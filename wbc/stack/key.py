@@ -33,7 +33,6 @@ PARTS = (
     "wbc.quick_dataclasses",
     "wbc.robot",
     "wbc.rotations",
-    "wbc.rotations",
     "wbc.sealed",
     "wbc.shapes",
     "wbc.stack",
