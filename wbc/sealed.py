@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from wbc.errors import FixedAttributeError, UnknownAttributeError
 
 #: Attribute of an object whose constructor is over
-SEALED = "_made"
+SEALED = "_sealed"
 
 
 class SealedClass(ABCMeta):
