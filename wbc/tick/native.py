@@ -205,6 +205,10 @@ class CompiledTick(Buffers, ABC):
         """Margins after the step only."""
         self._library.wbc_tick_look_ahead(self.pointer)
 
+    def hurries(self) -> bool:
+        """Whether the reported command is as fast as it may be and falls short, which the next problem counts on."""
+        return bool(self._library.wbc_tick_hurries(self.pointer))
+
     def find_lost(self, everything: bool) -> float:
         """What equality rows lose at the reported command, into the report; the largest as a rate, in row units.
 

@@ -109,6 +109,7 @@ static void unbend(wbc_tick *t) {
     memset(t->bend, 0, sizeof t->bend);
     memset(t->stopped, 0, sizeof t->stopped);
     t->curving = t->shortened = 0.0;
+    t->hurried = 0;
 }
 
 #if BENDING > 0 || (COMMAND != VELOCITY && CLOSING > 0)

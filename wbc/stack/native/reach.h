@@ -25,6 +25,8 @@
 #define APART 1e6
 /* Corrections of the step that follows moving targets */
 #define CORRECTIONS 2
+/* How often margins that hinder the step are looked for */
+#define WALLINGS 4
 
 /* out += J' diag(weight) x, and out = J v, for rows that share their columns and for rows with one non-zero each, as in
  * assemble.h */
@@ -216,23 +218,26 @@ static double held_short(const double *slope, double length) {
 
 /* The step of the linear model, kept to TRUSTED where it asks for more, in R, which it changes then, by `more`; 0 for none */
 static int trusted_step(wbc_tick *t, const double *free, const double *slope, double *step, double *more) {
-    solve_with(t, slope, step);
-    sharpen(t, free, 0.0, slope, step);
+    double pushed[WIDE];
+    memcpy(pushed, slope, sizeof pushed);
+    push_from_walls(t, free, pushed);
+    solve_with(t, pushed, step);
+    sharpen(t, free, 0.0, pushed, step);
     const double length = largest_step(step);
     if (length > TRUSTED) {
         *more = held_short(slope, length);
         if (REDUCES && t->reduced) return solve_stiffened(t, *more, slope, step);
         if (!cut_off(t, free, *more)) return 0;
-        solve_with(t, slope, step);
-        sharpen(t, free, *more, slope, step);
+        solve_with(t, pushed, step);
+        sharpen(t, free, *more, pushed, step);
     }
     for (int i = 0; i < NV; i++) step[i] *= free[i];
     return 1;
 }
 
 /* Weighted errors that the step in the metric R leaves, and what equality rows hold against them; `changed`: R is another one then */
-static int left_over(wbc_tick *t, const double *free, const double *error, const double *whole, double *force, int *changed) {
-    double step[WIDE], slope[WIDE] = {0}, more = 0.0;
+static int left_over(wbc_tick *t, const double *free, const double *error, const double *whole, double *step, double *force, int *changed) {
+    double slope[WIDE] = {0}, more = 0.0;
     /* What blocked joints are asked for is not asked of the others */
     for (int i = 0; i < NV; i++) slope[i] = free[i] * whole[i];
     const int ok = trusted_step(t, free, slope, step, &more);
@@ -247,21 +252,34 @@ static int left_over(wbc_tick *t, const double *free, const double *error, const
     return 1;
 }
 
+/* What bounds on velocities keep the last command of this tick from, of each error that it is to remove; where that is more than what
+ * a step leaves, it counts, and `whole` becomes what it is a part of */
+static void held_by_bounds(const wbc_tick *t, const double *error, double *force, double *whole) {
+    double rate[MT + 1];
+    along_all(t, t->report.v, rate);
+    for (int k = 0; k < LEADING; k++) {
+        const double f = t->weight[k] * t->report.factor[k], most = fabs(f * error[k]);
+        const double left = clamp(f * t->dt * (rate[k] - t->desired[k]), -most, most);
+        whole[k] = smaller(most, fabs(f * t->dt * t->desired[k]));
+        if (fabs(left) > fabs(force[k])) force[k] = left;
+    }
+}
+
 /* Share in [0, 1] of the curvature that counts, by the errors that are left and the least pivot of H */
-static double counted(const wbc_tick *t, const double *error, const double *force, double least) {
+static double counted(const wbc_tick *t, const double *each, const double *force, double least) {
     double size = 0.0, whole = 0.0;
     for (int k = 0; k < LEADING; k++) {
         size += fabs(force[k]) * force_scale[k];
-        whole += fabs(t->weight[k] * t->report.factor[k] * error[k]) * force_scale[k];
+        whole += each[k] * force_scale[k];
     }
     const double counts = clamp(size / (NEGLIGIBLE * least) - 1.0, 0.0, 1.0);
     return counts * clamp(size / (REMOVED * whole + DBL_MIN) - 1.0, 0.0, 1.0);
 }
 
 /* H += curvature of the errors that are left, with blocked joints cut off; how large it is, 0 for none to count */
-static double curve_errors(wbc_tick *t, const double *free, const double *error, const double *force, double least) {
+static double curve_errors(wbc_tick *t, const double *free, const double *each, const double *force, double least) {
     double most[4] = {0};
-    const double share = counted(t, error, force, least);
+    const double share = counted(t, each, force, least);
     if (!(share > 0.0)) return 0.0;
     const double *arg[6] = {t->q, t->v_last, t->p, &t->dt, force, t->handed};
     double *res[1] = {t->curvature_entries};
@@ -286,17 +304,18 @@ static double curve_errors(wbc_tick *t, const double *free, const double *error,
 
 /* Curvature into H and what makes it positive definite again; leaves the factor. `least`: its least pivot before. 1 where there is any
  * to count. */
-static int add_curvature(wbc_tick *t, const double *free, const double *error, const double *whole, const double *force, double least) {
+static int add_curvature(wbc_tick *t, const double *free, const double *each, const double *whole, const double *force, double least) {
     double slope[WIDE] = {0}, step[WIDE];
-    const double largest = curve_errors(t, free, error, force, least);
+    const double largest = curve_errors(t, free, each, force, least);
     if (largest == 0.0) return 0;
     const int amended = decompose_amended(t, larger(LEAST_PIVOT * largest, least), largest);
     /* The factor that is used has equality rows in it, and they are not in H */
     int equalities = 0;
     for (int i = 0; i < M_ALL; i++) equalities |= t->low[i] == t->high[i];
-    t->prepared = equalities ? refactor(t) : 1;
     int held = t->reduced;
     for (int k = 0; k < MC; k++) held |= bent[k] && t->strength[k] != 0.0;
+    if (!equalities) memset(t->strength, 0, sizeof t->strength);
+    t->prepared = equalities ? refactor(t) : 1;
     if (!t->prepared || !amended || !held) return 1;
     /* What is definite by little only makes a step that is too long for what is held */
     for (int i = 0; i < NV; i++) slope[i] = free[i] * whole[i];
@@ -380,22 +399,29 @@ static void reach(wbc_tick *t) {
 #if NNZK > 0
     /* There may be none also where code for stacks of any size is compiled */
     if (NNZK > 0) {
-        double force[MT + MC + 1], least, most;
+        double force[MT + MC + 1], each[MT + 1], step[WIDE], least, most;
+        for (int k = 0; k < LEADING; k++) each[k] = fabs(t->weight[k] * t->report.factor[k] * error[k]);
         int changed = exact;
+        memset(t->wall, 0, sizeof t->wall);
         find_pivots(t, &least, &most);
         t->firm = exact || KEPT;
-        int found = (t->firm == exact || cut_off(t, free, 0.0)) && left_over(t, free, error, slope, force, &changed);
+        int found = (t->firm == exact || cut_off(t, free, 0.0)) && left_over(t, free, error, slope, step, force, &changed);
         /* Errors that are left push against rows that bend: with how much is seen where these are firm */
-        if (BENDING > 0 && found && !t->firm && !t->reduced && counted(t, error, force, least) > 0.0) {
+        if (BENDING > 0 && found && !t->firm && !t->reduced && counted(t, each, force, least) > 0.0) {
             t->firm = 1;
-            found = cut_off(t, free, 0.0) && left_over(t, free, error, slope, force, &changed);
+            found = cut_off(t, free, 0.0) && left_over(t, free, error, slope, step, force, &changed);
+        }
+        for (int n = 0; MH > 0 && found && !t->reduced && n < WALLINGS && find_walls(t, step, force); n++) {
+            t->firm = 1;
+            found = cut_off(t, free, 0.0) && left_over(t, free, error, slope, step, force, &changed);
         }
         changed |= t->firm;
         t->firm = 0;
         if (!found) return;
+        if (t->hurried) held_by_bounds(t, error, force, each);
         const int prepared = t->prepared;
         t->prepared = 1;
-        t->curved = add_curvature(t, free, error, slope, force, least);
+        t->curved = add_curvature(t, free, each, slope, force, least);
         if (!t->prepared) return;
         if (!t->curved) t->prepared = prepared;
         if (!t->curved && changed && !(blocked ? cut_off(t, free, 0.0) : (t->prepared = refactor(t)))) return;
@@ -424,6 +450,23 @@ static void reach(wbc_tick *t) {
     }
 #endif
     if (t->prepared && !t->reduced) right_side(t);
+}
+
+/* Whether the command goes as fast as bounds on velocities let it and still falls short of a rate of the first level, which counts as
+ * curvature where the problem is assembled again */
+EXPORT int wbc_tick_hurries(wbc_tick *t) {
+    double rate[MT + 1], size = 0.0, whole = 0.0;
+    int bound = 0;
+    if (!CALM || COMMAND != VELOCITY || NNZK == 0 || t->plain != 0.0) return 0;
+    for (int i = 0; i < DOFS; i++) bound |= t->report.lambda[i] != 0.0 && t->report.v[i] != 0.0 && t->low[i] != t->high[i];
+    if (!bound) return 0;
+    along_all(t, t->report.v, rate);
+    for (int k = 0; k < LEADING; k++) {
+        const double f = t->weight[k] * t->report.factor[k] * force_scale[k];
+        size += fabs(f * (rate[k] - t->desired[k]));
+        whole += fabs(f * t->desired[k]);
+    }
+    return t->hurried = size > REMOVED * whole;
 }
 
 #endif

@@ -241,7 +241,13 @@ EXPORT int wbc_tick_step(wbc_tick *t) {
 #if BENDING > 0
     foresee(t);
 #endif
-    int nameless, flag = bent_answer(t, answer(t, &nameless), &nameless);
+    int nameless, flag = answer(t, &nameless);
+    if (has_answer(t, flag) && wbc_tick_hurries(t)) {
+        own_sides(t);
+        assemble(t, 1);
+        flag = answer(t, &nameless);
+    }
+    flag = bent_answer(t, flag, &nameless);
     flag = arriving_answer(t, flag, &nameless);
     if (PRICES) report_soft_rows(t);
     for (int k = 0; ELASTIC && flag == WBC_RELAXED && k < MC; k++)
