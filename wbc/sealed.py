@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from abc import ABCMeta
 from typing import TYPE_CHECKING, Any
 
@@ -12,12 +13,19 @@ SEALED = "_sealed"
 
 
 class SealedClass(ABCMeta):
-    """Makes objects that are sealed when their constructors are over."""
+    """Makes objects that are sealed when their constructors are over, but of classes from outside of the package."""
 
     def __call__(cls, *args: Any, **kwargs: Any) -> Any:
         made = super().__call__(*args, **kwargs)
-        vars(made)[SEALED] = True
+        if cls.__module__.startswith("wbc."):
+            vars(made)[SEALED] = True
         return made
+
+    @property
+    def __signature__(cls) -> inspect.Signature:
+        """That of the constructor, which ``__call__`` would hide."""
+        own = inspect.signature(cls.__init__)
+        return own.replace(parameters=list(own.parameters.values())[1:])
 
 
 class Sealed(metaclass=SealedClass):

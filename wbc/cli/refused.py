@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import zipfile
 from collections.abc import Iterable, Sequence
@@ -104,7 +105,7 @@ def taken_elsewhere(error: WbcError, words: Sequence[str]) -> str:
     """What to say of the file that a command of these words refused: what it is and what takes it; empty where the
     error is about no file, or one of the kind that was wanted.
     """
-    value, given = str(error.value), [word for word in words[1:] if Path(word).exists()]
+    value, given = str(error.value), [word for word in words[1:] if os.path.exists(word)]
     about = [word for word in given if word == value] or [
         word
         for word in given

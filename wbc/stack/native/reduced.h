@@ -8,6 +8,10 @@
 
 #include "mirrored.h"
 
+/* Pivots of a number that the compiler knows, up to this many, become code of their own each: with more it would not fit into the
+ * cache of instructions */
+#define FEW 8
+
 INLINE double thin_dot(const double *x, const double *y) {
     four sum = {0};
     for (int at = 0; at < THIN; at += 4) sum = MADD(GIVEN_FOUR(x + at), GIVEN_FOUR(y + at), sum);
@@ -212,16 +216,17 @@ INLINE int take_pivot(double *gram, int a, int width, double *row, double *roots
 }
 
 /* R^-1 of R'R = `gram`, whose upper triangle becomes R without the roots of its pivots, on its diagonal; 0 where it is not positive
- * definite. Rows wait for reciprocals of pivots only, not for their roots. `few`: a number that the compiler knows, up to FEW. */
+ * definite. Rows wait for reciprocals of pivots only, not for their roots. `few`: `width` is at most FEW, and known. */
 INLINE int invert(double *gram, int width, double *inverse, int few) {
     double row[WIDE] = {0}, roots[WIDE] = {0};
     for (int a = 0; a < width; a++)
         for (int at = 0; at < THIN; at += 4) FOUR(inverse + a * WIDE + at) = (four){0};
-    UNROLLED
-    for (int a = 0; few && a < width; a++)
-        if (!take_pivot(gram, a, width, row, roots, inverse)) return 0;
     for (int a = 0; !few && a < width; a++)
         if (!take_pivot(gram, a, width, row, roots, inverse)) return 0;
+#define TAKE(a) \
+    if (few && a < width && !take_pivot(gram, a, width, row, roots, inverse)) return 0;
+    TAKE(0) TAKE(1) TAKE(2) TAKE(3) TAKE(4) TAKE(5) TAKE(6) TAKE(7)
+#undef TAKE
     for (int a = 0; a < width; a++)
         for (int at = a & ~3; at < THIN; at += 4) FOUR(inverse + a * WIDE + at) *= GIVEN_FOUR(roots + at);
     return 1;

@@ -139,15 +139,6 @@ typedef wbc_wide wide;
 /* x y + z with two roundings on every processor, so that an export computes the same bits as the tick in Python */
 #define MADD(x, y, z) ((x) * (y) + (z))
 
-/* Loops of up to FEW turns, as many as the compiler knows, become code without one: with more it would not fit into the cache of
- * instructions */
-#define FEW 8
-#if defined(__GNUC__) && !defined(__clang__)
-#define UNROLLED _Pragma("GCC unroll 8")
-#else
-#define UNROLLED
-#endif
-
 /* Four numbers at once, wherever they are */
 typedef double four __attribute__((vector_size(4 * sizeof(double)), aligned(sizeof(double)), may_alias));
 #define EACH(x) ((four){x, x, x, x})
