@@ -24,7 +24,7 @@ class SealedClass(ABCMeta):
     @property
     def __signature__(cls) -> inspect.Signature:
         """That of the constructor, which ``__call__`` would hide."""
-        own = inspect.signature(cls.__init__)
+        own = inspect.signature(cls.__init__)  # type: ignore[misc]  # that of this class is what is asked for
         return own.replace(parameters=list(own.parameters.values())[1:])
 
 
