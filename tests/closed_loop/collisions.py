@@ -204,7 +204,9 @@ def folded(loop: Loop, name: str, starts: int = FOLDED, seed: int = 32) -> Figur
 
 
 def one_row_a_pair() -> Loop:
-    """The two arms of a humanoid, with rows for nearest points only; a few of its runs show what that leads to."""
+    """The two arms of a humanoid, with rows for nearest points only; a few of its runs show what that leads to where
+    arms go as fast as they may whatever is left of their task.
+    """
     robot, f = collision_machine("talos"), FRAMES["talos"]
     pairs = self_pairs("talos", f)
     items: dict[str, Item] = {
@@ -212,4 +214,4 @@ def one_row_a_pair() -> Loop:
         "fold": EndEffector(f.tip, kind="position", relative_to=pairs[0][1]),
         "caps": JointLimits(acceleration=False),
     }
-    return Loop(robot, items, DT, "vm")
+    return Loop(robot, items, DT, "vm", calm=False)

@@ -29,8 +29,10 @@ class Run:
 class Loop:
     """One compiled stack; each check switches on the items that it is about."""
 
-    def __init__(self, robot: Robot, items: Mapping[str, Item], dt: float, backend: str = "auto") -> None:
-        stack = wbc.Stack(robot, dt)
+    def __init__(
+        self, robot: Robot, items: Mapping[str, Item], dt: float, backend: str = "auto", calm: bool = True
+    ) -> None:
+        stack = wbc.Stack(robot, dt, calm=calm)
         for key, item in items.items():
             stack.add(item, name=key)
         self.robot, self.dt = robot, dt

@@ -275,6 +275,11 @@ class Batch(Sealed):
             else None
         )
 
+    @property
+    def falls_short(self) -> bool:
+        """Whether bounds on velocities hold back what a robot is told, which is differentiated for each alone."""
+        return bool(self._view("shortfall").any())
+
     @cached_property
     def pullback(self) -> Pullback:
         """What differentiates backwards.

@@ -20,6 +20,8 @@ from wbc.validation import Array
 _STEP = 1e-6
 
 Moves = Callable[[int, float], None]
+#: x of a first problem, and how it moves [n, k]
+First = tuple[Array, Array]
 
 
 def derivative(past: PastTick, name: str, value: str | None) -> Array:
@@ -29,7 +31,8 @@ def derivative(past: PastTick, name: str, value: str | None) -> Array:
 
     for the rows S that hold v. What stands on the right are central differences of the QP's numbers, which are smooth
     where the solution's change of rows is not, those of H and g by :func:`~wbc.qp.sensitivity.force_between`. With
-    strict levels they are differences of the levels, solved for the rows that push and the ranks of the tick.
+    strict levels they are differences of the levels, solved for the rows that push and the ranks of the tick. What
+    bounds on velocities let a first command leave of errors, see docs/reach.md, moves with that command.
 
     Raises:
         UnknownNameError: no such item or value. SolverError: rows gave way, no optimum, or a rank that changes here.
@@ -46,13 +49,14 @@ def derivative(past: PastTick, name: str, value: str | None) -> Array:
 
 def _of_one(past: PastTick, answer: Relaxed, moves: Moves, count: int) -> Array:
     """Of one level, or of the first."""
-    wide, variables = past.qp.with_slacks(), past.layout.variables
+    wide, variables = past.tick.qp().with_slacks(), past.layout.variables
     n, size = wide.n, wide.lower.size
     sensitivity = Sensitivity(wide, QPSolution(answer.x, answer.multipliers, "solved"))
     upper = np.where(answer.multipliers > 0.0, 1.0, 0.0)
     force, offset, middle = np.zeros((n, count)), np.zeros((size, count)), _squares(past, wide)
+    first = _first(past, moves, count)
     for k in range(count):
-        found = [_moved(past, moves, k, by) for by in (_STEP, -_STEP)]
+        found = [_moved(past, moves, k, by, first) for by in (_STEP, -_STEP)]
         ends, (up, down) = [qp for qp, _ in found], (squares for _, squares in found)
         A = _slope(ends, "A")
         force[:, k] = force_between(up, middle, down, answer.x) / (2.0 * _STEP) + A.T @ answer.multipliers[n:]
@@ -66,11 +70,12 @@ def _of_levels(past: PastTick, frozen: Frozen, moves: Moves, count: int) -> Arra
     """With strict levels: differences of their optimum, the rows that push at each and its rank being what they are."""
     dofs = past.layout.dof_scales(past.stack)
     first, out = _of_one(past, frozen.first, moves, count), np.zeros((past.layout.variables, count))
+    before = _first(past, moves, count)
     for k in range(count):
         ends: list[Array] = []
         for by in (_STEP, -_STEP):
             state = past.tick.state.copy()
-            moves(k, by)
+            _displace(past, moves, k, by, before)
             numbers = frozen.numbers(past.tick.qp(), frozen.first.x + by * first[:, k])
             past.tick.state[:] = state
             ends.append(frozen.optimum.at(numbers))
@@ -78,10 +83,35 @@ def _of_levels(past: PastTick, frozen: Frozen, moves: Moves, count: int) -> Arra
     return out
 
 
-def _moved(past: PastTick, moves: Moves, k: int, by: float) -> tuple[QP, Squares]:
+def _first(past: PastTick, moves: Moves, count: int) -> First | None:
+    """The command that bounds on velocities let leave something of the errors; None where there was none."""
+    shortfall = past.tick.shortfall.copy()
+    if not shortfall.any():
+        return None
+    past.tick.shortfall[:] = 0.0
+    answer = past.solve()[1]
+    found = None
+    if answer is not None and answer.flag == "solved":
+        found = answer.x[: past.layout.variables], _of_one(past, answer, moves, count)
+    past.tick.shortfall[:] = shortfall
+    return found
+
+
+def _displace(past: PastTick, moves: Moves, k: int, by: float, first: First | None) -> None:
+    tick = past.tick
+    moves(k, by)
+    if first is None:
+        return
+    tick.qp()
+    rows, most = tick.task_rows(), np.abs(tick.report[past.places["error"]])
+    left = float(tick.dt[0]) * (rows.J @ (first[0] + by * first[1][:, k]) - rows.desired)
+    tick.shortfall[:] = np.where(tick.shortfall != 0.0, np.clip(left, -most, most), 0.0)
+
+
+def _moved(past: PastTick, moves: Moves, k: int, by: float, first: First | None) -> tuple[QP, Squares]:
     """The QP of displaced inputs, and what it is made of."""
     state = past.tick.state.copy()
-    moves(k, by)
+    _displace(past, moves, k, by, first)
     qp = past.tick.qp().with_slacks()
     squares = _squares(past, qp)
     past.tick.state[:] = state

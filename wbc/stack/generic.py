@@ -74,9 +74,9 @@ WRITTEN = (
 #: What the tick compiled for the stack does in place of what is here, once there is one
 FORWARDED = (
     "wbc_tick_arrive", "wbc_tick_assemble", "wbc_tick_certify", "wbc_tick_check", "wbc_tick_curvature",
-    "wbc_tick_ease", "wbc_tick_find_lost", "wbc_tick_hurries", "wbc_tick_look_ahead", "wbc_tick_missed", "wbc_tick_reset",
-    "wbc_tick_resume", "wbc_tick_safe_step", "wbc_tick_solve", "wbc_tick_step", "wbc_tick_suspend", "wbc_tick_take",
-    "wbc_tick_task_rows", "wbc_tick_torques",
+    "wbc_tick_ease", "wbc_tick_find_lost", "wbc_tick_hurries", "wbc_tick_look_ahead", "wbc_tick_missed",
+    "wbc_tick_reset", "wbc_tick_resume", "wbc_tick_safe_step", "wbc_tick_solve", "wbc_tick_step", "wbc_tick_suspend",
+    "wbc_tick_take", "wbc_tick_task_rows", "wbc_tick_torques",
 )  # fmt: skip
 #: What is either there or not when C is compiled
 _CHOICES = ("LEVELS", "SOFT_ROWS", "SLEWED")

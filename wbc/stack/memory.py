@@ -114,6 +114,7 @@ INPUTS = (
     Field("curving", (), "not 0: H has the curvature of equality rows, whatever CALM says; a tick begins with 0"),
     Field("shortened", (), "on the diagonal of H besides, in units of dof_scale; a tick begins with 0"),
     Field("stopped", ("NV",), "1 for joints that bounds stop and that others do not count on; a tick begins with 0"),
+    Field("shortfall", ("MT",), "of errors, by bounds on velocities: see reach.h; a tick begins with 0", True),
     Field("plain", (), "not 0: the linear model as it is, whatever CALM says"),
 )
 #: Of accelerations

@@ -314,14 +314,10 @@ class _ProgramBuilder:
         margins = item.margins(robot, tracer, inputs)
         assert margins is not None
         margin = self.column(block, "margins", margins)
-        sensed = item.sensed_rows(robot)
-        if self.stack.calm and self.layout.leading and block.entry.price is None:
-            start = self.layout.task_rows + block.start
-            bent = margin[: count - sensed, :]
-            self.forces += tracer.forces(ca.dot(self.force[start : start + bent.numel()], bent))
         rate = self.p[block.slots["rate"].span]
         fade = item.row_factor(robot, tracer, inputs)
         factor = ca.SX.ones(count) if fade is None else self.column(block, "row_factor", fade)
+        sensed = item.sensed_rows(robot)
         matrix = tracer.slope(margin[: count - sensed, :])
         margin, drift, factor, matrix = tracer.expanded(margin, self.drift(block, margin), factor, matrix)
         own = slice(count - sensed), slice(None)  # of one row alone, drift[:0] would lie down

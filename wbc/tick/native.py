@@ -73,6 +73,7 @@ class CompiledTick(Buffers, ABC):
         self._sides = view("free_low"), view("free_high")
         self._give, self.bend = view("give"), view("bend")
         self.curving, self.stopped, self.shortened = view("curving"), view("stopped"), view("shortened")
+        self.shortfall = view("shortfall")
         self._library.wbc_tick_find_lost.restype = self._library.wbc_tick_ease.restype = ctypes.c_double
         self.step_function = self._library.wbc_tick_step
         #: one tick; returns its flag
@@ -206,7 +207,7 @@ class CompiledTick(Buffers, ABC):
         self._library.wbc_tick_look_ahead(self.pointer)
 
     def hurries(self) -> bool:
-        """Whether the reported command is as fast as it may be and falls short, which the next problem counts on."""
+        """Whether the reported command goes as fast as it may and falls short, by ``shortfall``."""
         return bool(self._library.wbc_tick_hurries(self.pointer))
 
     def find_lost(self, everything: bool) -> float:

@@ -121,14 +121,17 @@ class SolvedTick(Buffers):
         if refused:
             return refused
         self.v_in[:] = self.v_last
-        return self.finish(self.assembly.qp())
+        return self.finish(self.assembly.qp(), hurries=True)
 
-    def finish(self, qp: QP) -> int:
+    def finish(self, qp: QP, hurries: bool = False) -> int:
         """Solve a QP of this layout and write the report; the flag, with ``UNSOUND`` where the certificate fails.
         Equality rows make up for what they lose within the tick; where that does not help, the step gets shorter.
+
+        Args:
+            hurries: what bounds on velocities let the command leave of errors makes another QP.
         """
         flag = self._answered(qp)
-        if flag in (SOLVED, RELAXED) and self.assembly.hurries():
+        if hurries and flag in (SOLVED, RELAXED) and self.assembly.hurries():
             qp = self.assembly.qp()
             flag = self._answered(qp)
         everything = flag == SOLVED

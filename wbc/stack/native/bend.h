@@ -109,7 +109,7 @@ static void unbend(wbc_tick *t) {
     memset(t->bend, 0, sizeof t->bend);
     memset(t->stopped, 0, sizeof t->stopped);
     t->curving = t->shortened = 0.0;
-    t->hurried = 0;
+    memset(t->shortfall, 0, sizeof t->shortfall);
 }
 
 #if BENDING > 0 || (COMMAND != VELOCITY && CLOSING > 0)

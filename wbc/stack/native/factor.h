@@ -38,7 +38,7 @@ INLINE int strengthens(const wbc_tick *t, int k) {
     /* A level minimises what keeps its task's direction: only the search for curvature has it */
     if (t->firm && kept_of[k] >= 0) return t->free_low[k] == t->free_high[k];
 #endif
-    return (t->firm && t->wall[k]) || t->low[NV + k] == t->high[NV + k];
+    return t->low[NV + k] == t->high[NV + k];
 }
 
 /* The largest entry on the diagonal of H, in units of dof_scale */
@@ -60,7 +60,7 @@ static void strengthen(wbc_tick *t) {
             square += a * a;
         }
         if (square <= DEAD) continue;
-        t->strength[k] = t->stiffness / square * (t->firm && (kept_of[k] >= 0 || bent[k] || t->wall[k]) ? FIRM : 1.0);
+        t->strength[k] = t->stiffness / square * (t->firm && (kept_of[k] >= 0 || bent[k]) ? FIRM : 1.0);
 #if SOFT_ROWS > 0
         if (t->settled && t->give[k] > 0.0) {
             t->strength[k] = smaller(larger(MODEST * t->strength[k], SHARE / t->give[k]), 0.5 / t->give[k]);

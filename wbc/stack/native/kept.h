@@ -13,36 +13,9 @@ static void without_kept(const wbc_tick *t, const double *step, double *force) {
     }
 }
 
-/* What is left of a margin */
-INLINE double room_left(const wbc_tick *t, int k) { return larger(t->report.margin[margin_at[k]], 0.0); }
-
 /* What equality rows that bend hold against the weighted errors, behind those */
 static void held_back(const wbc_tick *t, const double *step, double *force) {
-    for (int k = 0; k < MC; k++) {
-        const double left = t->wall[k] ? room_left(t, k) : 0.0;
-        force[MT + k] = bent[k] || t->wall[k] ? t->strength[k] * (left - row_at(t, k, step)) : 0.0;
-    }
-}
-
-/* Margins that the step, which is one against the errors, would use up, and those among them that hold nothing; 0 where they are the
- * same as before */
-static int find_walls(wbc_tick *t, const double *step, const double *force) {
-    int changed = 0;
-    for (int k = 0; k < MC; k++) {
-        if (margin_at[k] < 0 || t->enabled[k] == 0.0 || price_at[k] >= 0 || t->far[k] || t->free_low[k] <= -WBC_INF) continue;
-        const double left = room_left(t, k) - row_at(t, k, step);
-        const int wall = t->wall[k] ? force[MT + k] < 0.0 : left < -TOLERANCE * row_scale[k];
-        changed |= wall != t->wall[k];
-        t->wall[k] = wall;
-    }
-    return changed;
-}
-
-/* What keeps walls where they are adds to the slope */
-static void push_from_walls(const wbc_tick *t, const double *free, double *slope) {
-    for (int k = 0; k < MC; k++)
-        for (int e = a_start[k]; t->wall[k] && e < a_end[k]; e++)
-            slope[a_col[e]] += free[a_col[e]] * t->strength[k] * t->at[e] * room_left(t, k);
+    for (int k = 0; k < MC; k++) force[MT + k] = bent[k] ? -t->strength[k] * row_at(t, k, step) : 0.0;
 }
 
 /* The same where they are taken out of the problem: what slope - (H + more / dof_scale^2) step leaves on the variables that they give */

@@ -25,8 +25,6 @@
 #define APART 1e6
 /* Corrections of the step that follows moving targets */
 #define CORRECTIONS 2
-/* How often margins that hinder the step are looked for */
-#define WALLINGS 4
 
 /* out += J' diag(weight) x, and out = J v, for rows that share their columns and for rows with one non-zero each, as in
  * assemble.h */
@@ -218,26 +216,23 @@ static double held_short(const double *slope, double length) {
 
 /* The step of the linear model, kept to TRUSTED where it asks for more, in R, which it changes then, by `more`; 0 for none */
 static int trusted_step(wbc_tick *t, const double *free, const double *slope, double *step, double *more) {
-    double pushed[WIDE];
-    memcpy(pushed, slope, sizeof pushed);
-    push_from_walls(t, free, pushed);
-    solve_with(t, pushed, step);
-    sharpen(t, free, 0.0, pushed, step);
+    solve_with(t, slope, step);
+    sharpen(t, free, 0.0, slope, step);
     const double length = largest_step(step);
     if (length > TRUSTED) {
         *more = held_short(slope, length);
         if (REDUCES && t->reduced) return solve_stiffened(t, *more, slope, step);
         if (!cut_off(t, free, *more)) return 0;
-        solve_with(t, pushed, step);
-        sharpen(t, free, *more, pushed, step);
+        solve_with(t, slope, step);
+        sharpen(t, free, *more, slope, step);
     }
     for (int i = 0; i < NV; i++) step[i] *= free[i];
     return 1;
 }
 
 /* Weighted errors that the step in the metric R leaves, and what equality rows hold against them; `changed`: R is another one then */
-static int left_over(wbc_tick *t, const double *free, const double *error, const double *whole, double *step, double *force, int *changed) {
-    double slope[WIDE] = {0}, more = 0.0;
+static int left_over(wbc_tick *t, const double *free, const double *error, const double *whole, double *force, int *changed) {
+    double step[WIDE], slope[WIDE] = {0}, more = 0.0;
     /* What blocked joints are asked for is not asked of the others */
     for (int i = 0; i < NV; i++) slope[i] = free[i] * whole[i];
     const int ok = trusted_step(t, free, slope, step, &more);
@@ -252,16 +247,15 @@ static int left_over(wbc_tick *t, const double *free, const double *error, const
     return 1;
 }
 
-/* What bounds on velocities keep the last command of this tick from, of each error that it is to remove; where that is more than what
- * a step leaves, it counts, and `whole` becomes what it is a part of */
-static void held_by_bounds(const wbc_tick *t, const double *error, double *force, double *whole) {
-    double rate[MT + 1];
-    along_all(t, t->report.v, rate);
-    for (int k = 0; k < LEADING; k++) {
-        const double f = t->weight[k] * t->report.factor[k], most = fabs(f * error[k]);
-        const double left = clamp(f * t->dt * (rate[k] - t->desired[k]), -most, most);
-        whole[k] = smaller(most, fabs(f * t->dt * t->desired[k]));
-        if (fabs(left) > fabs(force[k])) force[k] = left;
+/* What bounds on velocities let a command leave of errors counts where it is more than what a step leaves, and `whole` becomes what it is
+ * a part of */
+static void held_by_bounds(const wbc_tick *t, double *force, double *whole) {
+    int any = 0;
+    for (int k = 0; k < LEADING; k++) any |= t->shortfall[k] != 0.0;
+    for (int k = 0; any && k < LEADING; k++) {
+        const double f = t->weight[k] * t->report.factor[k];
+        whole[k] = smaller(whole[k], fabs(f * t->dt * t->desired[k]));
+        if (fabs(f * t->shortfall[k]) > fabs(force[k])) force[k] = f * t->shortfall[k];
     }
 }
 
@@ -314,7 +308,6 @@ static int add_curvature(wbc_tick *t, const double *free, const double *each, co
     for (int i = 0; i < M_ALL; i++) equalities |= t->low[i] == t->high[i];
     int held = t->reduced;
     for (int k = 0; k < MC; k++) held |= bent[k] && t->strength[k] != 0.0;
-    if (!equalities) memset(t->strength, 0, sizeof t->strength);
     t->prepared = equalities ? refactor(t) : 1;
     if (!t->prepared || !amended || !held) return 1;
     /* What is definite by little only makes a step that is too long for what is held */
@@ -399,26 +392,21 @@ static void reach(wbc_tick *t) {
 #if NNZK > 0
     /* There may be none also where code for stacks of any size is compiled */
     if (NNZK > 0) {
-        double force[MT + MC + 1], each[MT + 1], step[WIDE], least, most;
+        double force[MT + MC + 1], each[MT + 1], least, most;
         for (int k = 0; k < LEADING; k++) each[k] = fabs(t->weight[k] * t->report.factor[k] * error[k]);
         int changed = exact;
-        memset(t->wall, 0, sizeof t->wall);
         find_pivots(t, &least, &most);
         t->firm = exact || KEPT;
-        int found = (t->firm == exact || cut_off(t, free, 0.0)) && left_over(t, free, error, slope, step, force, &changed);
+        int found = (t->firm == exact || cut_off(t, free, 0.0)) && left_over(t, free, error, slope, force, &changed);
         /* Errors that are left push against rows that bend: with how much is seen where these are firm */
         if (BENDING > 0 && found && !t->firm && !t->reduced && counted(t, each, force, least) > 0.0) {
             t->firm = 1;
-            found = cut_off(t, free, 0.0) && left_over(t, free, error, slope, step, force, &changed);
-        }
-        for (int n = 0; MH > 0 && found && !t->reduced && n < WALLINGS && find_walls(t, step, force); n++) {
-            t->firm = 1;
-            found = cut_off(t, free, 0.0) && left_over(t, free, error, slope, step, force, &changed);
+            found = cut_off(t, free, 0.0) && left_over(t, free, error, slope, force, &changed);
         }
         changed |= t->firm;
         t->firm = 0;
         if (!found) return;
-        if (t->hurried) held_by_bounds(t, error, force, each);
+        held_by_bounds(t, force, each);
         const int prepared = t->prepared;
         t->prepared = 1;
         t->curved = add_curvature(t, free, each, slope, force, least);
@@ -452,21 +440,27 @@ static void reach(wbc_tick *t) {
     if (t->prepared && !t->reduced) right_side(t);
 }
 
-/* Whether the command goes as fast as bounds on velocities let it and still falls short of a rate of the first level, which counts as
- * curvature where the problem is assembled again */
+/* Whether joints that nothing keeps from turning round at once go as fast as they may, and the command still falls short of the rates
+ * of the first level: what is left of errors then counts as curvature where the problem is assembled again */
 EXPORT int wbc_tick_hurries(wbc_tick *t) {
     double rate[MT + 1], size = 0.0, whole = 0.0;
     int bound = 0;
     if (!CALM || COMMAND != VELOCITY || NNZK == 0 || t->plain != 0.0) return 0;
-    for (int i = 0; i < DOFS; i++) bound |= t->report.lambda[i] != 0.0 && t->report.v[i] != 0.0 && t->low[i] != t->high[i];
+    for (int i = 0; i < DOFS; i++) {
+        const int slow = brake_at[i] >= 0 && t->bound_enabled[brake_at[i]] != 0.0;
+        bound |= !slow && t->report.lambda[i] != 0.0 && t->report.v[i] != 0.0 && t->low[i] != t->high[i];
+    }
     if (!bound) return 0;
     along_all(t, t->report.v, rate);
     for (int k = 0; k < LEADING; k++) {
-        const double f = t->weight[k] * t->report.factor[k] * force_scale[k];
+        const double f = t->weight[k] * t->report.factor[k] * force_scale[k], most = fabs(t->report.error[k]);
         size += fabs(f * (rate[k] - t->desired[k]));
         whole += fabs(f * t->desired[k]);
+        t->shortfall[k] = f != 0.0 ? clamp(t->dt * (rate[k] - t->desired[k]), -most, most) : 0.0;
     }
-    return t->hurried = size > REMOVED * whole;
+    if (size > REMOVED * whole) return 1;
+    memset(t->shortfall, 0, sizeof t->shortfall);
+    return 0;
 }
 
 #endif

@@ -124,8 +124,6 @@ typedef struct {
     double stiffness;            /* what fixed variables add to the Hessian, in units of dof_scale */
     double curvature_entries[NNZK + 1]; /* of its upper triangle */
     int idle[MC + 1];            /* rows that no velocity within the bounds violates */
-    int hurried;                 /* the last command of this tick goes as fast as it may and falls short: see reach.h */
-    int wall[MC + 1];            /* margins that the step of the linear model would use up: see kept.h */
     int left_out[MC + 1];        /* rows of linkages that depend on others, and their sides */
     double left_side[MC + 1];
     int far[MC + 1];             /* rows of balls and sensed pairs that are left out of this tick */
