@@ -51,10 +51,12 @@ def on_a_slow_base(calm: bool, seed: int, solver: str = "daqp") -> tuple[wbc.Con
     robot = robot_of(name)
     point = tuple(rng.uniform(-3.0, 3.0, 3) + (0.0, 0.0, 0.8))
     stack = wbc.Stack(robot, 0.005, calm=calm).add(Distance(tip, point=point), name="range")
-    controller = stack.add(Posture(), weight=1e-3).add(JointLimits()).compile(solver=solver, backend="vm")
+    controller = (
+        stack.add(Posture(), name="posture", weight=1e-3).add(JointLimits()).compile(solver=solver, backend="vm")
+    )
     q = start(robot, rng)
     controller.reset(q)
-    controller["range"].target = rng.uniform(0.05, 0.5)
+    controller["range"].target, controller["posture"].target = rng.uniform(0.05, 0.5), q
     return controller, q
 
 
@@ -76,7 +78,6 @@ def test_joints_do_not_go_to_and_fro_where_a_base_is_slow() -> None:
 def test_commands_move_with_what_bounds_hold_back(solver: str) -> None:
     """Derivatives against differences, and all ticks of a batch as one alone."""
     controller, q = on_a_slow_base(True, 2, solver)
-    controller.step(q)  # the posture is that of q from here on
     robot, unit, by = controller.stack.robot, np.eye(controller.stack.robot.nv), 1e-6
 
     def command(place: np.ndarray) -> np.ndarray:
