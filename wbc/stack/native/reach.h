@@ -260,7 +260,7 @@ static void held_by_bounds(const wbc_tick *t, double *force, double *whole) {
 }
 
 /* Share in [0, 1] of the curvature that counts, by the errors that are left and the least pivot of H */
-static double counted(const wbc_tick *t, const double *each, const double *force, double least) {
+static double counted(const double *each, const double *force, double least) {
     double size = 0.0, whole = 0.0;
     for (int k = 0; k < LEADING; k++) {
         size += fabs(force[k]) * force_scale[k];
@@ -273,7 +273,7 @@ static double counted(const wbc_tick *t, const double *each, const double *force
 /* H += curvature of the errors that are left, with blocked joints cut off; how large it is, 0 for none to count */
 static double curve_errors(wbc_tick *t, const double *free, const double *each, const double *force, double least) {
     double most[4] = {0};
-    const double share = counted(t, each, force, least);
+    const double share = counted(each, force, least);
     if (!(share > 0.0)) return 0.0;
     const double *arg[6] = {t->q, t->v_last, t->p, &t->dt, force, t->handed};
     double *res[1] = {t->curvature_entries};
@@ -399,7 +399,7 @@ static void reach(wbc_tick *t) {
         t->firm = exact || KEPT;
         int found = (t->firm == exact || cut_off(t, free, 0.0)) && left_over(t, free, error, slope, force, &changed);
         /* Errors that are left push against rows that bend: with how much is seen where these are firm */
-        if (BENDING > 0 && found && !t->firm && !t->reduced && counted(t, each, force, least) > 0.0) {
+        if (BENDING > 0 && found && !t->firm && !t->reduced && counted(each, force, least) > 0.0) {
             t->firm = 1;
             found = cut_off(t, free, 0.0) && left_over(t, free, error, slope, force, &changed);
         }
