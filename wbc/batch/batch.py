@@ -276,9 +276,9 @@ class Batch(Sealed):
         )
 
     @property
-    def falls_short(self) -> bool:
-        """Whether bounds on velocities hold back what a robot is told, which is differentiated for each alone."""
-        return bool(self._view("shortfall").any())
+    def held_back(self) -> bool:
+        """Whether bounds on velocities or margins hold a robot back, which is differentiated for each alone."""
+        return bool(self._view("shortfall").any() or self._view("pressed").any())
 
     @cached_property
     def pullback(self) -> Pullback:

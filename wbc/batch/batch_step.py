@@ -33,8 +33,8 @@ class StepOwner(Protocol):
         """What differentiates all ticks at once; None where each is done alone."""
 
     @property
-    def falls_short(self) -> bool:
-        """Whether bounds on velocities hold back what a robot is told, as docs/reach.md says."""
+    def held_back(self) -> bool:
+        """Whether bounds on velocities or margins hold a robot back, as docs/reach.md says."""
 
     @property
     def pullback(self) -> Pullback:
@@ -187,8 +187,8 @@ class BatchStep:
             step.derivative("q")                  # [n, nv, nv]
             step.derivative("hand", "target")     # [n, nv, 6]
 
-        All at once where the stack has one level without soft rows, is compiled and no robot's bounds on velocities
-        hold back what it is told; else one after the other.
+        All at once where the stack has one level without soft rows, is compiled and no robot is held back by bounds on
+        velocities or margins, see docs/reach.md; else one after the other.
 
         Raises:
             UnknownNameError: no such item or value.
@@ -199,7 +199,7 @@ class BatchStep:
             number = int(np.flatnonzero(~self.solved)[0])
             reason = f"robot {number} is {self.statuses[number]}: only a command for which every row holds has one"
             raise SolverError("derivative", name, reason)
-        if (together := self._owner.derivatives) is not None and not self._owner.falls_short:
+        if (together := self._owner.derivatives) is not None and not self._owner.held_back:
             return together.find(name, value, self._reports, self._owner.inputs)
         return np.stack([self[k].derivative(name, value) for k in range(len(self))])
 

@@ -20,8 +20,8 @@ from wbc.validation import Array
 _STEP = 1e-6
 
 Moves = Callable[[int, float], None]
-#: x of a first problem, and how it moves [n, k]
-First = tuple[Array, Array]
+#: x and the rows' multipliers of a first problem, and how they move [n, k], [m, k]
+First = tuple[Array, Array, Array, Array]
 
 
 def derivative(past: PastTick, name: str, value: str | None) -> Array:
@@ -32,7 +32,7 @@ def derivative(past: PastTick, name: str, value: str | None) -> Array:
     for the rows S that hold v. What stands on the right are central differences of the QP's numbers, which are smooth
     where the solution's change of rows is not, those of H and g by :func:`~wbc.qp.sensitivity.force_between`. With
     strict levels they are differences of the levels, solved for the rows that push and the ranks of the tick. What
-    bounds on velocities let a first command leave of errors, see docs/reach.md, moves with that command.
+    bounds and margins keep a first command from, see docs/reach.md, moves with that command.
 
     Raises:
         UnknownNameError: no such item or value. SolverError: rows gave way, no optimum, or a rank that changes here.
@@ -44,11 +44,11 @@ def derivative(past: PastTick, name: str, value: str | None) -> Array:
     answer = past.solve()[1] if past.usable and not past.layout.cascade else None
     if answer is None or answer.flag != "solved":
         raise SolverError("derivative", name, "only a command for which every row holds has a derivative")
-    return _of_one(past, answer, moves, count)[: past.layout.nv]
+    return _of_one(past, answer, moves, count)[0][: past.layout.nv]
 
 
-def _of_one(past: PastTick, answer: Relaxed, moves: Moves, count: int) -> Array:
-    """Of one level, or of the first."""
+def _of_one(past: PastTick, answer: Relaxed, moves: Moves, count: int) -> tuple[Array, Array]:
+    """Of one level, or of the first, and of its rows' multipliers."""
     wide, variables = past.tick.qp().with_slacks(), past.layout.variables
     n, size = wide.n, wide.lower.size
     sensitivity = Sensitivity(wide, QPSolution(answer.x, answer.multipliers, "solved"))
@@ -63,13 +63,14 @@ def _of_one(past: PastTick, answer: Relaxed, moves: Moves, count: int) -> Array:
         with np.errstate(invalid="ignore"):
             ends_moved = np.where(upper > 0.0, _slope(ends, "upper"), _slope(ends, "lower"))
         offset[:, k] = np.nan_to_num(ends_moved) - np.concatenate((np.zeros(n), A @ answer.x))
-    return sensitivity.change(force, offset)[:variables]
+    x, multipliers = sensitivity.changes(force, offset)
+    return x[:variables], multipliers[n:]
 
 
 def _of_levels(past: PastTick, frozen: Frozen, moves: Moves, count: int) -> Array:
     """With strict levels: differences of their optimum, the rows that push at each and its rank being what they are."""
     dofs = past.layout.dof_scales(past.stack)
-    first, out = _of_one(past, frozen.first, moves, count), np.zeros((past.layout.variables, count))
+    first, out = _of_one(past, frozen.first, moves, count)[0], np.zeros((past.layout.variables, count))
     before = _first(past, moves, count)
     for k in range(count):
         ends: list[Array] = []
@@ -84,28 +85,33 @@ def _of_levels(past: PastTick, frozen: Frozen, moves: Moves, count: int) -> Arra
 
 
 def _first(past: PastTick, moves: Moves, count: int) -> First | None:
-    """The command that bounds on velocities let leave something of the errors; None where there was none."""
-    shortfall = past.tick.shortfall.copy()
-    if not shortfall.any():
+    """The answer that bounds on velocities or margins held back; None where they did not."""
+    held = past.tick.shortfall, past.tick.pressed
+    before = [part.copy() for part in held]
+    if not any(part.any() for part in before):
         return None
-    past.tick.shortfall[:] = 0.0
-    answer = past.solve()[1]
-    found = None
+    for part in held:
+        part[:] = 0.0
+    wide, answer, found = past.tick.qp().with_slacks(), past.solve()[1], None
     if answer is not None and answer.flag == "solved":
-        found = answer.x[: past.layout.variables], _of_one(past, answer, moves, count)
-    past.tick.shortfall[:] = shortfall
+        found = answer.x[: past.layout.variables], answer.multipliers[wide.n :], *_of_one(past, answer, moves, count)
+    for part, value in zip(held, before, strict=True):
+        part[:] = value
     return found
 
 
 def _displace(past: PastTick, moves: Moves, k: int, by: float, first: First | None) -> None:
-    tick = past.tick
+    tick, dt = past.tick, float(past.tick.dt[0])
     moves(k, by)
     if first is None:
         return
     tick.qp()
+    x, multipliers, slope, turn = first
     rows, most = tick.task_rows(), np.abs(tick.report[past.places["error"]])
-    left = float(tick.dt[0]) * (rows.J @ (first[0] + by * first[1][:, k]) - rows.desired)
-    tick.shortfall[:] = np.where(tick.shortfall != 0.0, np.clip(left, -most, most), 0.0)
+    left = np.clip(dt * (rows.J @ (x + by * slope[:, k]) - rows.desired), -most, most)
+    tick.shortfall[:] = np.where(tick.shortfall != 0.0, left, 0.0)
+    size = tick.pressed.size
+    tick.pressed[:] = np.where(tick.pressed != 0.0, dt * (multipliers + by * turn[:, k])[:size], 0.0)
 
 
 def _moved(past: PastTick, moves: Moves, k: int, by: float, first: First | None) -> tuple[QP, Squares]:

@@ -92,12 +92,16 @@ class Sensitivity:
 
     def change(self, force: Array, offset: Array) -> Array:
         """dx [n, k] for k changes: ``force`` = dH x + dg + dC' lam [n, k], ``offset`` = db - dC x [n + m, k]."""
+        return self.changes(force, offset)[0]
+
+    def changes(self, force: Array, offset: Array) -> tuple[Array, Array]:
+        """:meth:`change`, and that of the multipliers of [1; C] [n + m, k]."""
         factor, rows = self._factor, self._rows
-        out = np.zeros(force.shape)
+        out, multipliers = np.zeros(force.shape), np.zeros(offset.shape)
         for k in range(force.shape[1]):
-            dy, _ = rows.solve(-factor.inverse.T @ force[:, k], offset[rows.index, k])
+            dy, multipliers[rows.index, k] = rows.solve(-factor.inverse.T @ force[:, k], offset[rows.index, k])
             out[:, k] = factor.inverse @ dy
-        return out
+        return out, multipliers
 
     def to_bound(self, row: int) -> Array:
         """dx / db of the bound that holds a row of [1; A]; zero for rows that hold nothing [n]."""

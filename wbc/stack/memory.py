@@ -115,6 +115,7 @@ INPUTS = (
     Field("shortened", (), "on the diagonal of H besides, in units of dof_scale; a tick begins with 0"),
     Field("stopped", ("NV",), "1 for joints that bounds stop and that others do not count on; a tick begins with 0"),
     Field("shortfall", ("MT",), "of errors, by bounds on velocities: see reach.h; a tick begins with 0", True),
+    Field("pressed", ("MC",), "force of margins on the command times dt: see reach.h; a tick begins with 0", True),
     Field("plain", (), "not 0: the linear model as it is, whatever CALM says"),
 )
 #: Of accelerations

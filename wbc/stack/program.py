@@ -318,6 +318,11 @@ class _ProgramBuilder:
         fade = item.row_factor(robot, tracer, inputs)
         factor = ca.SX.ones(count) if fade is None else self.column(block, "row_factor", fade)
         sensed = item.sensed_rows(robot)
+        if self.stack.calm and self.stack.command == "velocity" and self.layout.leading and block.entry.price is None:
+            start = self.layout.task_rows + block.start
+            self.forces += tracer.forces(
+                ca.dot(self.force[start : start + count - sensed], margin[: count - sensed, :])
+            )
         matrix = tracer.slope(margin[: count - sensed, :])
         margin, drift, factor, matrix = tracer.expanded(margin, self.drift(block, margin), factor, matrix)
         own = slice(count - sensed), slice(None)  # of one row alone, drift[:0] would lie down

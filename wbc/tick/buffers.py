@@ -69,7 +69,7 @@ REST_RATE = 20.0
 CHAIN = ("cold", "daqp", "osqp", "elastic")
 
 #: Buffers that are 0 when a tick begins, and that the tick itself writes
-OWN = ("bend", "curving", "stopped", "shortened", "shortfall")
+OWN = ("bend", "curving", "stopped", "shortened", "shortfall", "pressed")
 
 
 class Buffers:
@@ -84,8 +84,8 @@ class Buffers:
         bound_enabled: the same for each entry of each bound block.
         bend: added to both sides of equality rows that bend, see ``native/bend.h``; curving: not 0 where H has their
             curvature without calm motion, too; stopped: 1 for joints that bounds stop; shortened: on
-            the diagonal of H besides; shortfall: what bounds on velocities let a command leave of each error, see
-            ``native/reach.h``. All 0 when a tick begins.
+            the diagonal of H besides; shortfall, pressed: what bounds on velocities let a command leave of each
+            error, and what margins hold against it, see ``native/reach.h``. All 0 when a tick begins.
         report: see :class:`wbc.stack.memory.Memory`.
         state: all of these in one piece of memory that begins with the report. ``v_in`` in it is, after a tick, the
             velocity that the tick counted accelerations from.
@@ -106,6 +106,7 @@ class Buffers:
     stopped: Array
     shortened: Array
     shortfall: Array
+    pressed: Array
     report: Array
     state: Array
     #: of accelerations, the torques of the last command and the wrenches that a tick without an answer keeps

@@ -73,7 +73,7 @@ class CompiledTick(Buffers, ABC):
         self._sides = view("free_low"), view("free_high")
         self._give, self.bend = view("give"), view("bend")
         self.curving, self.stopped, self.shortened = view("curving"), view("stopped"), view("shortened")
-        self.shortfall = view("shortfall")
+        self.shortfall, self.pressed = view("shortfall"), view("pressed")
         self._library.wbc_tick_find_lost.restype = self._library.wbc_tick_ease.restype = ctypes.c_double
         self.step_function = self._library.wbc_tick_step
         #: one tick; returns its flag

@@ -110,6 +110,7 @@ static void unbend(wbc_tick *t) {
     memset(t->stopped, 0, sizeof t->stopped);
     t->curving = t->shortened = 0.0;
     memset(t->shortfall, 0, sizeof t->shortfall);
+    memset(t->pressed, 0, sizeof t->pressed);
 }
 
 #if BENDING > 0 || (COMMAND != VELOCITY && CLOSING > 0)

@@ -23,6 +23,8 @@
 /* Corrections of a step with residuals in wide arithmetic, where the squared pivots of the metric are further apart */
 #define SHARPENED 3
 #define APART 1e6
+/* Joints that move by less in a tick are still [rad, or characteristic lengths] */
+#define STILL 1e-7
 /* Corrections of the step that follows moving targets */
 #define CORRECTIONS 2
 
@@ -270,15 +272,38 @@ static double counted(const double *each, const double *force, double least) {
     return counts * clamp(size / (REMOVED * whole + DBL_MIN) - 1.0, 0.0, 1.0);
 }
 
+/* Entries of the curvature that belongs to forces; 0 where they are not finite */
+static int find_curvature(wbc_tick *t, const double *force) {
+    const double *arg[6] = {t->q, t->v_last, t->p, &t->dt, force, t->handed};
+    double *res[1] = {t->curvature_entries};
+    curvature(arg, res, t->work_iw, t->work_w, 0);
+    return all_finite(t->curvature_entries, NNZK);
+}
+
+/* Margins that hold against the last command bend within the tick: the diagonal of H gets so much of each line of their curvature that
+ * it outweighs that whatever its signs are; whether there are any */
+static int damp_along_margins(wbc_tick *t) {
+    double force[MT + MC + 1] = {0};
+    int any = 0;
+    for (int k = 0; k < MC; k++) {
+        force[MT + k] = t->pressed[k];
+        any |= t->pressed[k] != 0.0;
+    }
+    if (!any || !find_curvature(t, force)) return 0;
+    for (int e = 0; e < NNZK; e++) {
+        const int i = k_row[e], j = k_col[e];
+        const double size = fabs(t->curvature_entries[e]);
+        t->H[i * WIDE + i] += size * dof_scale[j] / dof_scale[i];
+        if (i != j) t->H[j * WIDE + j] += size * dof_scale[i] / dof_scale[j];
+    }
+    return 1;
+}
+
 /* H += curvature of the errors that are left, with blocked joints cut off; how large it is, 0 for none to count */
 static double curve_errors(wbc_tick *t, const double *free, const double *each, const double *force, double least) {
     double most[4] = {0};
     const double share = counted(each, force, least);
-    if (!(share > 0.0)) return 0.0;
-    const double *arg[6] = {t->q, t->v_last, t->p, &t->dt, force, t->handed};
-    double *res[1] = {t->curvature_entries};
-    curvature(arg, res, t->work_iw, t->work_w, 0);
-    if (!all_finite(t->curvature_entries, NNZK)) return 0.0;
+    if (!(share > 0.0) || !find_curvature(t, force)) return 0.0;
 #if LEVELS > 0
     memset(t->curvature, 0, sizeof t->curvature);
 #endif
@@ -407,6 +432,7 @@ static void reach(wbc_tick *t) {
         t->firm = 0;
         if (!found) return;
         held_by_bounds(t, force, each);
+        changed |= damp_along_margins(t);
         const int prepared = t->prepared;
         t->prepared = 1;
         t->curved = add_curvature(t, free, each, slope, force, least);
@@ -440,17 +466,24 @@ static void reach(wbc_tick *t) {
     if (t->prepared && !t->reduced) right_side(t);
 }
 
-/* Whether joints that nothing keeps from turning round at once go as fast as they may, and the command still falls short of the rates
- * of the first level: what is left of errors then counts as curvature where the problem is assembled again */
+/* Whether the problem is to be assembled again, for joints that nothing keeps from turning round at once: where they go as fast as they
+ * may and the command still falls short of the rates of the first level, what is left of errors counts as curvature, and where they
+ * move, what margins hold against them. */
 EXPORT int wbc_tick_hurries(wbc_tick *t) {
     double rate[MT + 1], size = 0.0, whole = 0.0;
-    int bound = 0;
+    int bound = 0, moves = 0, pressed = 0;
     if (!CALM || COMMAND != VELOCITY || NNZK == 0 || t->plain != 0.0) return 0;
     for (int i = 0; i < DOFS; i++) {
-        const int slow = brake_at[i] >= 0 && t->bound_enabled[brake_at[i]] != 0.0;
-        bound |= !slow && t->report.lambda[i] != 0.0 && t->report.v[i] != 0.0 && t->low[i] != t->high[i];
+        if (brake_at[i] >= 0 && t->bound_enabled[brake_at[i]] != 0.0) continue;
+        bound |= t->report.lambda[i] != 0.0 && t->report.v[i] != 0.0 && t->low[i] != t->high[i];
+        moves |= fabs(t->report.v[i]) * t->dt > STILL * dof_scale[i];
     }
-    if (!bound) return 0;
+    for (int k = 0; moves && k < MC; k++) {
+        if (margin_at[k] < 0 || price_at[k] >= 0) continue;
+        t->pressed[k] = t->dt * t->report.lambda[NV + k];
+        pressed |= t->pressed[k] != 0.0;
+    }
+    if (!bound) return pressed;
     along_all(t, t->report.v, rate);
     for (int k = 0; k < LEADING; k++) {
         const double f = t->weight[k] * t->report.factor[k] * force_scale[k], most = fabs(t->report.error[k]);
@@ -460,7 +493,7 @@ EXPORT int wbc_tick_hurries(wbc_tick *t) {
     }
     if (size > REMOVED * whole) return 1;
     memset(t->shortfall, 0, sizeof t->shortfall);
-    return 0;
+    return pressed;
 }
 
 #endif
