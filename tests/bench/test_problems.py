@@ -30,8 +30,8 @@ def case(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactor
 
 @pytest.fixture(scope="module")
 def ours(case: Case) -> Ours:
-    """This package on it."""
-    return Ours(case)
+    """This package on it, with the linear model that the problem states."""
+    return Ours(case, calm=False)
 
 
 def test_shared_description_is_the_robot(case: Case) -> None:

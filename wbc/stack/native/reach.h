@@ -24,7 +24,7 @@
 #define SHARPENED 3
 #define APART 1e6
 /* Joints that move by less in a tick are still [rad, or characteristic lengths] */
-#define STILL 1e-7
+#define MOVELESS 1e-7
 /* Corrections of the step that follows moving targets */
 #define CORRECTIONS 2
 
@@ -466,17 +466,34 @@ static void reach(wbc_tick *t) {
     if (t->prepared && !t->reduced) right_side(t);
 }
 
+/* Whether a joint at its bound would leave it, within the tick, for the curvature that belongs to forces */
+static int turns_within(wbc_tick *t, const double *force) {
+    double change[NV] = {0};
+    if (!find_curvature(t, force)) return 0;
+    for (int e = 0; e < NNZK; e++) {
+        const int i = k_row[e], j = k_col[e];
+        change[i] += t->curvature_entries[e] * t->report.v[j];
+        if (i != j) change[j] += t->curvature_entries[e] * t->report.v[i];
+    }
+    int turns = 0;
+    for (int i = 0; i < DOFS; i++) {
+        const double push = t->report.lambda[i];
+        turns |= (push > 0.0 && change[i] > push) || (push < 0.0 && change[i] < push);
+    }
+    return turns;
+}
+
 /* Whether the problem is to be assembled again, for joints that nothing keeps from turning round at once: where they go as fast as they
- * may and the command still falls short of the rates of the first level, what is left of errors counts as curvature, and where they
- * move, what margins hold against them. */
+ * may, further than is good for the rates of the first level, of which the command falls short, what is left of errors counts as
+ * curvature, and where they move, what margins hold against them. */
 EXPORT int wbc_tick_hurries(wbc_tick *t) {
-    double rate[MT + 1], size = 0.0, whole = 0.0;
+    double rate[MT + 1], force[MT + MC + 1] = {0};
     int bound = 0, moves = 0, pressed = 0;
     if (!CALM || COMMAND != VELOCITY || NNZK == 0 || t->plain != 0.0) return 0;
     for (int i = 0; i < DOFS; i++) {
         if (brake_at[i] >= 0 && t->bound_enabled[brake_at[i]] != 0.0) continue;
         bound |= t->report.lambda[i] != 0.0 && t->report.v[i] != 0.0 && t->low[i] != t->high[i];
-        moves |= fabs(t->report.v[i]) * t->dt > STILL * dof_scale[i];
+        moves |= fabs(t->report.v[i]) * t->dt > MOVELESS * dof_scale[i];
     }
     for (int k = 0; moves && k < MC; k++) {
         if (margin_at[k] < 0 || price_at[k] >= 0) continue;
@@ -486,12 +503,11 @@ EXPORT int wbc_tick_hurries(wbc_tick *t) {
     if (!bound) return pressed;
     along_all(t, t->report.v, rate);
     for (int k = 0; k < LEADING; k++) {
-        const double f = t->weight[k] * t->report.factor[k] * force_scale[k], most = fabs(t->report.error[k]);
-        size += fabs(f * (rate[k] - t->desired[k]));
-        whole += fabs(f * t->desired[k]);
+        const double most = fabs(t->report.error[k]), f = t->weight[k] * t->report.factor[k];
         t->shortfall[k] = f != 0.0 ? clamp(t->dt * (rate[k] - t->desired[k]), -most, most) : 0.0;
+        force[k] = f * t->shortfall[k];
     }
-    if (size > REMOVED * whole) return 1;
+    if (turns_within(t, force)) return 1;
     memset(t->shortfall, 0, sizeof t->shortfall);
     return pressed;
 }
