@@ -466,6 +466,7 @@ static void reach(wbc_tick *t) {
     if (t->prepared && !t->reduced) right_side(t);
 }
 
+#if NNZK > 0
 /* Whether a joint at its bound would leave it, within the tick, for the curvature that belongs to forces */
 static int turns_within(wbc_tick *t, const double *force) {
     double change[NV] = {0};
@@ -482,14 +483,16 @@ static int turns_within(wbc_tick *t, const double *force) {
     }
     return turns;
 }
+#endif
 
 /* Whether the problem is to be assembled again, for joints that nothing keeps from turning round at once: where they go as fast as they
  * may, further than is good for the rates of the first level, of which the command falls short, what is left of errors counts as
  * curvature, and where they move, what margins hold against them. */
 EXPORT int wbc_tick_hurries(wbc_tick *t) {
+#if NNZK > 0
     double rate[MT + 1], force[MT + MC + 1] = {0};
     int bound = 0, moves = 0, pressed = 0;
-    if (!CALM || COMMAND != VELOCITY || NNZK == 0 || t->plain != 0.0) return 0;
+    if (!CALM || COMMAND != VELOCITY || t->plain != 0.0) return 0;
     for (int i = 0; i < DOFS; i++) {
         if (brake_at[i] >= 0 && t->bound_enabled[brake_at[i]] != 0.0) continue;
         bound |= t->report.lambda[i] != 0.0 && t->report.v[i] != 0.0 && t->low[i] != t->high[i];
@@ -510,6 +513,10 @@ EXPORT int wbc_tick_hurries(wbc_tick *t) {
     if (turns_within(t, force)) return 1;
     memset(t->shortfall, 0, sizeof t->shortfall);
     return pressed;
+#else
+    (void)t;
+    return 0;
+#endif
 }
 
 #endif
