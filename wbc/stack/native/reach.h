@@ -283,13 +283,13 @@ static int find_curvature(wbc_tick *t, const double *force) {
 /* Margins that hold against the last command bend within the tick: the diagonal of H gets so much of each line of their curvature that
  * it outweighs that whatever its signs are; whether there are any */
 static int damp_along_margins(wbc_tick *t) {
-    double force[MT + MC + 1] = {0};
+    double force[MT + MC + 1];
     int any = 0;
-    for (int k = 0; k < MC; k++) {
-        force[MT + k] = t->pressed[k];
-        any |= t->pressed[k] != 0.0;
-    }
-    if (!any || !find_curvature(t, force)) return 0;
+    for (int k = 0; k < MC; k++) any |= t->pressed[k] != 0.0;
+    if (!any) return 0;
+    memset(force, 0, sizeof force);
+    for (int k = 0; k < MC; k++) force[MT + k] = t->pressed[k];
+    if (!find_curvature(t, force)) return 0;
     for (int e = 0; e < NNZK; e++) {
         const int i = k_row[e], j = k_col[e];
         const double size = fabs(t->curvature_entries[e]);
@@ -490,7 +490,7 @@ static int turns_within(wbc_tick *t, const double *force) {
  * curvature, and where they move, what margins hold against them. */
 EXPORT int wbc_tick_hurries(wbc_tick *t) {
 #if NNZK > 0
-    double rate[MT + 1], force[MT + MC + 1] = {0};
+    double rate[MT + 1], force[MT + MC + 1];
     int bound = 0, moves = 0, pressed = 0;
     if (!CALM || COMMAND != VELOCITY || t->plain != 0.0) return 0;
     for (int i = 0; i < DOFS; i++) {
@@ -504,6 +504,7 @@ EXPORT int wbc_tick_hurries(wbc_tick *t) {
         pressed |= t->pressed[k] != 0.0;
     }
     if (!bound) return pressed;
+    memset(force, 0, sizeof force);
     along_all(t, t->report.v, rate);
     for (int k = 0; k < LEADING; k++) {
         const double most = fabs(t->report.error[k]), f = t->weight[k] * t->report.factor[k];
